@@ -1,0 +1,23 @@
+#pragma once
+/// \file The only file that knows which compiler is at work. Everything else says HEMO_HD and is portable.
+
+#if defined(__CUDACC__)
+#define HEMO_HD __host__ __device__
+#else
+#define HEMO_HD
+#endif
+
+#if defined(__GNUC__) || defined(__CUDACC__)
+#define HEMO_RESTRICT __restrict__
+#define HEMO_INLINE inline __attribute__((always_inline))
+#else
+#define HEMO_RESTRICT
+#define HEMO_INLINE inline
+#endif
+
+namespace hemowalk {
+
+/// Where memory lies and loops run.
+enum class Place { host, device };
+
+}  // namespace hemowalk
