@@ -21,7 +21,8 @@ struct alignas(4 * sizeof(Real)) Node4 {
 /// The halo holds neighbours or periodic images; beyond a wall it holds the wall's velocity (fields read by
 /// interpolation) or receives the wall's share of the force (fields written by spreading).
 struct Block {
-  static constexpr int halo = 2;  ///< half the support of phi4
+  /// Half the support of phi4, and one node that markers may travel between two sorts.
+  static constexpr int halo = 3;
 
   int nx = 0, ny = 0, nz = 0;
 
