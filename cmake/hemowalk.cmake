@@ -27,7 +27,7 @@ endif()
 add_library(hemowalk_flags INTERFACE)
 target_include_directories(hemowalk_flags INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(hemowalk_flags INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wno-unknown-pragmas -fno-math-errno -fno-trapping-math>)
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wno-maybe-uninitialized -fno-math-errno -fno-trapping-math>)
 if(HEMOWALK_NATIVE)
   target_compile_options(hemowalk_flags INTERFACE
     $<$<COMPILE_LANGUAGE:CXX>:-march=native -mprefer-vector-width=512>)

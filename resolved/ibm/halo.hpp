@@ -1,0 +1,30 @@
+#pragma once
+/// \file Halo of the two coupling fields: the velocity is filled outward, the force is folded inward (its
+/// adjoint).
+
+#include <array>
+
+#include "core/block.hpp"
+#include "core/view.hpp"
+
+namespace hemowalk::ibm {
+
+/// What lies beyond each face of the block.
+struct Faces {
+  bool periodic_x = true, periodic_y = false, periodic_z = true;
+  std::array<double, 3> lower_wall{}, upper_wall{};  ///< wall velocities (y faces), lattice units
+};
+
+/// Fills the halo: periodic images in x, z (and y); beyond a wall every node carries the wall's velocity, so
+/// that the part of a kernel that reaches through a wall reads the wall.
+template <class Real>
+void fill_velocity_halo(const Block& block, const Faces& faces, View<Node4<Real>> velocity);
+
+/// Adds what was spread into the halo to the nodes it stands for; what fell beyond a wall is that wall's
+/// impulse. Adjoint of fill_velocity_halo. \returns impulse per step on the lower and upper wall, lattice
+/// units.
+template <class Real>
+std::array<std::array<double, 3>, 2> fold_force_halo(const Block& block, const Faces& faces,
+                                                     View<Node4<Real>> force);
+
+}  // namespace hemowalk::ibm

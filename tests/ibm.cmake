@@ -1,0 +1,6 @@
+hemowalk_test(test_ibm SOURCES unit/test_ibm_kernel.cpp unit/test_ibm_markers.cpp LINK hemowalk_ibm LABELS unit)
+find_package(benchmark QUIET)
+if(benchmark_FOUND)
+  add_executable(bench_ibm benchmarks/bench_ibm.cpp)
+  target_link_libraries(bench_ibm PRIVATE hemowalk_ibm benchmark::benchmark)
+endif()
