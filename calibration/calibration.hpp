@@ -13,9 +13,10 @@ namespace hemowalk::calibration {
 
 struct Options {
   std::string kind = "platelet";
-  double t0 = 0.3;                                ///< s, start of the window
-  std::optional<std::array<double, 2>> core;      ///< m, layer of the `plateau` estimator; default: from the walls
-  std::optional<double> lag;                      ///< s; default: automatic plateau lag
+  double t0 = 0.3;  ///< s, start of the window
+  std::optional<std::array<double, 2>>
+      core;                   ///< m, layer of the `plateau` estimator; default: from the walls
+  std::optional<double> lag;  ///< s; default: automatic plateau lag
   int bootstrap = 1000;
   std::uint64_t seed = 1;
 };
@@ -23,28 +24,28 @@ struct Options {
 /// One estimate of D. sigma is one standard error; ci68 from the bootstrap.
 struct Estimate {
   std::string name;
-  double D = 0, sigma = 0;             ///< m2/s
-  std::array<double, 2> ci68{};        ///< m2/s
-  int n = 0;                           ///< platelets (or pairs) used
-  double lag = 0;                      ///< s, where one applies
-  std::string note;                    ///< empty, or why the value is absent / limited
+  double D = 0, sigma = 0;       ///< m2/s
+  std::array<double, 2> ci68{};  ///< m2/s
+  int n = 0;                     ///< platelets (or pairs) used
+  double lag = 0;                ///< s, where one applies
+  std::string note;              ///< empty, or why the value is absent / limited
 };
 
 /// A curve for charts: ensemble or time-averaged MSD of one layer.
 struct MsdCurve {
-  std::string layer, method;                       ///< "all" | "core"; "single_origin" | "time_averaged"
-  std::vector<double> lag, msd, sigma;             ///< s, m2, m2
-  double fit_slope = 0, fit_intercept = 0;         ///< m2/s, m2
-  std::array<double, 2> fit_range{};               ///< s
+  std::string layer, method;                ///< "all" | "core"; "single_origin" | "time_averaged"
+  std::vector<double> lag, msd, sigma;      ///< s, m2, m2
+  double fit_slope = 0, fit_intercept = 0;  ///< m2/s, m2
+  std::array<double, 2> fit_range{};        ///< s
 };
 
 /// Comparison with one published value.
 struct Verdict {
   std::string source;
   bool matched_conditions = false;
-  double D = 0;       ///< m2/s, published
+  double D = 0;  ///< m2/s, published
   double D_lo = 0, D_hi = 0;
-  double z = 0;       ///< (ours - theirs) / combined standard error; NaN where none can be stated
+  double z = 0;  ///< (ours - theirs) / combined standard error; NaN where none can be stated
   std::string statement;
 };
 
@@ -61,9 +62,9 @@ struct Calibration {
     std::vector<double> lag, excess;
   } kurtosis;
   std::vector<Verdict> verdict;
-  data::TransportLaw law;            ///< carries the gate's findings
+  data::TransportLaw law;  ///< carries the gate's findings
   std::vector<std::string> warnings;
-  double wall = 0;                   ///< s
+  double wall = 0;  ///< s
 
   const Estimate* find(const std::string& name) const {
     for (const auto& e : estimators)

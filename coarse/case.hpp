@@ -15,23 +15,24 @@ struct Face {
 };
 
 struct Case {
-  std::string law_file;               ///< transport_law.yaml, resolved relative to the case file
-  std::optional<double> constant_D;   ///< m2/s; exactly one of the two is set
-  double height = 0.82e-3;            ///< m
+  std::string law_file;              ///< transport_law.yaml, resolved relative to the case file
+  std::optional<double> constant_D;  ///< m2/s; exactly one of the two is set
+  double height = 0.82e-3;           ///< m
   Face bottom{Face::Type::absorb, 0}, top{Face::Type::reflect, 0};
-  double shear_rate = 0;              ///< 1/s, couette advection along z; 0 = none
+  double shear_rate = 0;  ///< 1/s, couette advection along z; 0 = none
   std::int64_t walkers = 1'000'000;
-  double dt = 10e-3;                  ///< s
-  double end = 300;                   ///< s
-  std::vector<double> output;         ///< s, increasing, <= end
+  double dt = 10e-3;           ///< s
+  double end = 300;            ///< s
+  std::vector<double> output;  ///< s, increasing, <= end
   std::string initial = "uniform";
   std::uint64_t seed = 1;
-  std::string name = "coarse";        ///< file stem, names the output
+  std::string name = "coarse";  ///< file stem, names the output
   std::string input_sha256;
 };
 
 /// Reads coarse.yaml. \throws InputError with every problem as file:line:col.
 Case read_case(const std::string& path, const std::vector<std::string>& overrides = {});
-Case parse_case(const std::string& text, const std::string& name, const std::vector<std::string>& overrides = {});
+Case parse_case(const std::string& text, const std::string& name,
+                const std::vector<std::string>& overrides = {});
 
 }  // namespace hemowalk::coarse

@@ -11,15 +11,15 @@
 namespace hemowalk::coarse {
 
 struct Result {
-  std::string method = "walk";            ///< walk | fokker_planck
-  std::string reason;                     ///< why this method and step law
-  std::vector<double> time;               ///< [T] s
-  std::vector<double> absorbed_fraction;  ///< [T]
-  std::vector<double> absorbed_sigma;     ///< [T] sampling error of the walkers
-  std::vector<double> absorbed_law_sigma; ///< [T] from the law's uncertainty (its draws, or D_sigma)
+  std::string method = "walk";             ///< walk | fokker_planck
+  std::string reason;                      ///< why this method and step law
+  std::vector<double> time;                ///< [T] s
+  std::vector<double> absorbed_fraction;   ///< [T]
+  std::vector<double> absorbed_sigma;      ///< [T] sampling error of the walkers
+  std::vector<double> absorbed_law_sigma;  ///< [T] from the law's uncertainty (its draws, or D_sigma)
   struct Profile {
-    std::vector<double> y;                ///< [Y] m, bin centres
-    std::vector<double> c;                ///< [T*Y] concentration relative to the initial uniform one
+    std::vector<double> y;  ///< [Y] m, bin centres
+    std::vector<double> c;  ///< [T*Y] concentration relative to the initial uniform one
   } profile;
   std::int64_t walkers = 0;
   double walker_steps_per_s = 0, wall = 0;  ///< 1/s, s
@@ -27,9 +27,9 @@ struct Result {
 };
 
 struct RunOptions {
-  bool strict = false;                        ///< \throws Refused outside the law's validity
-  int law_draws = 16;                         ///< ensemble size for absorbed_law_sigma; 0 = skip
-  std::function<void(double)> progress;       ///< fraction done, called now and then
+  bool strict = false;                   ///< \throws Refused outside the law's validity
+  int law_draws = 16;                    ///< ensemble size for absorbed_law_sigma; 0 = skip
+  std::function<void(double)> progress;  ///< fraction done, called now and then
 };
 
 /// Runs the walk. Results depend on the seed only, not on threads, ranks or output times.

@@ -34,7 +34,9 @@ struct Block {
   /// Position of node (i, j, k) in a field; each index may lie in [-halo, n + halo).
   HEMO_HD constexpr std::size_t at(int i, int j, int k) const {
     return (static_cast<std::size_t>(k + halo) * (static_cast<std::size_t>(ny) + 2 * halo) +
-            static_cast<std::size_t>(j + halo)) * row() + static_cast<std::size_t>(i + halo);
+            static_cast<std::size_t>(j + halo)) *
+               row() +
+           static_cast<std::size_t>(i + halo);
   }
 };
 

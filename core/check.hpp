@@ -7,7 +7,16 @@
 namespace hemowalk {
 
 /// Exit codes of the program (docs/reference.md).
-enum class Exit : int { done = 0, internal = 1, usage = 2, physics = 3, refused = 4, failed_runs = 5, io = 74, interrupted = 75 };
+enum class Exit : int {
+  done = 0,
+  internal = 1,
+  usage = 2,
+  physics = 3,
+  refused = 4,
+  failed_runs = 5,
+  io = 74,
+  interrupted = 75
+};
 
 /// Base of all errors that carry an exit code.
 struct Error : std::runtime_error {
@@ -41,7 +50,7 @@ inline void require(bool condition, const std::string& message) {
 }
 /// Overload for hot callers: the message is only built when the check fails.
 template <class MakeMessage>
-  requires requires(MakeMessage m) { std::string(m()); }
+requires requires(MakeMessage m) { std::string(m()); }
 void require(bool condition, MakeMessage&& make_message) {
   if (!condition) throw InputError(make_message());
 }

@@ -31,7 +31,9 @@ void for_each(Place place, std::size_t n, const Body& body) {
   static_assert(std::is_trivially_copyable_v<Body>, "device bodies are copied into the kernel");
   if (n) for_each_kernel<<<static_cast<unsigned>((n + 255) / 256), 256>>>(n, body);
 #else
-  throw Error(Exit::usage, "place: device asked for (this binary was built without CUDA) build the cuda preset or use place: host");
+  throw Error(Exit::usage,
+              "place: device asked for (this binary was built without CUDA) build the cuda preset or use "
+              "place: host");
 #endif
 }
 

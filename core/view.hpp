@@ -17,11 +17,7 @@ struct View {
   HEMO_HD T& operator[](std::size_t i) const { return data[i]; }
   HEMO_HD T* begin() const { return data; }
   HEMO_HD T* end() const { return data + size; }
-  HEMO_HD operator View<const T>() const
-    requires(!std::is_const_v<T>)
-  {
-    return {data, size};
-  }
+  HEMO_HD operator View<const T>() const requires(!std::is_const_v<T>) { return {data, size}; }
 };
 
 }  // namespace hemowalk

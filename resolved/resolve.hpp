@@ -10,10 +10,10 @@
 namespace hemowalk::resolved {
 
 struct RunOptions {
-  std::string out;                                ///< run folder: trajectories.h5, cells.xdmf, checkpoint/
-  bool resume = false;                            ///< continue from out/checkpoint if there is one
+  std::string out;      ///< run folder: trajectories.h5, cells.xdmf, checkpoint/
+  bool resume = false;  ///< continue from out/checkpoint if there is one
   std::function<void(double, const std::string&)> progress;  ///< fraction done, one line of state
-  std::function<bool()> stop_requested;           ///< polled; true -> checkpoint, then Interrupted
+  std::function<bool()> stop_requested;                      ///< polled; true -> checkpoint, then Interrupted
 };
 
 struct RunSummary {

@@ -48,13 +48,13 @@ struct Coupling {
   enum class Scheme { conservative, paper, peskin } scheme = Scheme::conservative;
   enum class Kernel { phi2, phi3, phi4 } kernel = Kernel::phi4;
   int cycles = 1;
-  int solid_every = 1;       ///< fluid steps per solid step
-  double retraction = 0.7;   ///< delta, in dx (method: thickness of a smeared sheet)
+  int solid_every = 1;                    ///< fluid steps per solid step
+  double retraction = 0.7;                ///< delta, in dx (method: thickness of a smeared sheet)
   double theta_n = 0.97, theta_t = 0.97;  ///< slip correction, normal and tangential
   double chi = 8.0 / 3.0;
   std::optional<double> velocity_cap;  ///< lattice units
   bool median_filter = false;
-  int iterations = 1;                  ///< solid iterations per coupling step (conservative)
+  int iterations = 1;  ///< solid iterations per coupling step (conservative)
 };
 
 struct Contact {
@@ -72,16 +72,16 @@ struct Shape {
 
 struct Bending {
   enum class Model { paper, helfrich, none } model = Model::paper;
-  double modulus = 1e-18;           ///< N m
-  double reference_curvature = 0;   ///< 1/m (helfrich)
+  double modulus = 1e-18;          ///< N m
+  double reference_curvature = 0;  ///< 1/m (helfrich)
 };
 
 /// A kind of cell: geometry, density and membrane law.
 struct Kind {
   std::string name;
   Shape shape;
-  int subdivision = 8;     ///< n of the subdivided octahedron: 4 n^2 + 2 vertices
-  double density = 1125;   ///< kg/m3
+  int subdivision = 8;    ///< n of the subdivided octahedron: 4 n^2 + 2 vertices
+  double density = 1125;  ///< kg/m3
   enum class Law { paper, neo_hookean, skalak, rigid } law = Law::paper;
   double B = 5e-6, C = 5000e-6, D = 35e-6;  ///< N/m, law: paper
   double Gs = 5e-6;                         ///< N/m, neo_hookean and skalak
@@ -94,9 +94,9 @@ struct Kind {
 
 struct Placement {
   std::string kind;
-  Vec3 position{};        ///< m, centre
-  Vec3 axis{0, 1, 0};     ///< rotation axis
-  double angle = 0;       ///< rad
+  Vec3 position{};     ///< m, centre
+  Vec3 axis{0, 1, 0};  ///< rotation axis
+  double angle = 0;    ///< rad
 };
 
 /// A force on the fraction of a cell's vertices that lies farthest towards one end.
@@ -104,11 +104,11 @@ struct Load {
   int cell = 0;
   std::string end;  ///< +x -x +y -y +z -z
   double fraction = 0.02;
-  Vec3 force{};     ///< N, in all
+  Vec3 force{};  ///< N, in all
 };
 
 struct Cells {
-  std::optional<double> hematocrit;   ///< or explicit placements, never both
+  std::optional<double> hematocrit;  ///< or explicit placements, never both
   double platelets_per_rbc = 0;
   std::vector<Kind> kinds;
   std::vector<Placement> placements;  ///< yaml key: explicit
@@ -116,12 +116,12 @@ struct Cells {
 };
 
 struct Time {
-  double end = 1;             ///< s
-  double sample = 1e-3;       ///< s, trajectories
-  double profile = 10e-3;     ///< s
-  double surface = 0;         ///< s; 0 = never
-  double checkpoint_wall = 600;             ///< s of wall time; 0 = never
-  std::optional<double> checkpoint_every;   ///< s, simulated
+  double end = 1;                          ///< s
+  double sample = 1e-3;                    ///< s, trajectories
+  double profile = 10e-3;                  ///< s
+  double surface = 0;                      ///< s; 0 = never
+  double checkpoint_wall = 600;            ///< s of wall time; 0 = never
+  std::optional<double> checkpoint_every;  ///< s, simulated
 };
 
 struct Places {
@@ -141,8 +141,8 @@ struct Scene {
   std::uint64_t seed = 1;
   Places place;
 
-  std::string source_text;    ///< canonical YAML of this scene (comments and white space gone)
-  std::string input_sha256;   ///< of source_text: equal physics, equal hash
+  std::string source_text;   ///< canonical YAML of this scene (comments and white space gone)
+  std::string input_sha256;  ///< of source_text: equal physics, equal hash
 
   const Kind* find_kind(const std::string& name) const {
     for (const auto& k : cells.kinds)
@@ -155,6 +155,7 @@ struct Scene {
 /// \p overrides are "dotted.key=value" texts applied before validation.
 Scene read_scene(const std::string& path, const std::vector<std::string>& overrides = {});
 /// The same from text; \p name stands for the file in messages.
-Scene parse_scene(const std::string& text, const std::string& name, const std::vector<std::string>& overrides = {});
+Scene parse_scene(const std::string& text, const std::string& name,
+                  const std::vector<std::string>& overrides = {});
 
 }  // namespace hemowalk::data

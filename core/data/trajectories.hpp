@@ -11,9 +11,9 @@ namespace hemowalk::data {
 
 /// The tracks of one kind of cell. Arrays are [time][cell] row-major; scalars may be empty if not recorded.
 struct Tracks {
-  std::vector<std::int64_t> id;      ///< [N]
-  std::vector<double> position;      ///< [T*N*3] m, periodic axes unwrapped
-  std::vector<double> orientation;   ///< [T*N*3] unit symmetry axis; may be empty
+  std::vector<std::int64_t> id;     ///< [N]
+  std::vector<double> position;     ///< [T*N*3] m, periodic axes unwrapped
+  std::vector<double> orientation;  ///< [T*N*3] unit symmetry axis; may be empty
   /// Per-cell observables [T*N]: taylor_deformation, axial_diameter, transverse_diameter, inclination,
   /// tank_treading_angle, area, volume (m, rad, m2, m3).
   std::map<std::string, std::vector<double>> observables;
@@ -35,26 +35,27 @@ struct Profiles {
 struct Diagnostics {
   std::vector<double> time;               ///< [K] s
   std::vector<double> momentum_residual;  ///< [K*3] relative
-  std::vector<double> energy_residual, mass_error, volume_error_max, max_speed_ratio, overlap_max, slip_rms;  ///< [K]
+  std::vector<double> energy_residual, mass_error, volume_error_max, max_speed_ratio, overlap_max,
+      slip_rms;  ///< [K]
 };
 
 /// What the resolved solver hands to calibration; also what published data are imported into.
 struct Trajectories {
-  std::string version;           ///< of the program that wrote it
-  double acceleration = 1;       ///< s; for the record, all values are physical already
-  double shear_rate = 0;         ///< 1/s
-  std::array<double, 3> box{};   ///< m
+  std::string version;              ///< of the program that wrote it
+  double acceleration = 1;          ///< s; for the record, all values are physical already
+  double shear_rate = 0;            ///< 1/s
+  std::array<double, 3> box{};      ///< m
   std::array<double, 2> walls_y{};  ///< m, lower and upper wall
   double hematocrit_true = 0;
-  double kappa_damping = 0;      ///< NaN = not stated
-  double t_c = 0;                ///< s, shape-recovery time; NaN = not measured
-  double Ca = 0, Re = 0;         ///< NaN = not known
+  double kappa_damping = 0;  ///< NaN = not stated
+  double t_c = 0;            ///< s, shape-recovery time; NaN = not measured
+  double Ca = 0, Re = 0;     ///< NaN = not known
   std::uint64_t seed = 0;
   std::string scene_yaml;
   std::string input_sha256;
 
-  std::vector<double> time;              ///< [T] s, strictly increasing, intervals may differ
-  std::map<std::string, Tracks> kinds;   ///< "platelet", "rbc", ...
+  std::vector<double> time;             ///< [T] s, strictly increasing, intervals may differ
+  std::map<std::string, Tracks> kinds;  ///< "platelet", "rbc", ...
   Profiles profile;
   Diagnostics diagnostics;
 };

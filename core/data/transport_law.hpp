@@ -19,22 +19,23 @@ struct Finding {
 struct TransportLaw {
   struct Conditions {
     double shear_rate = 100;  ///< 1/s
-    double hematocrit = 0.35, gap = 0 /*m*/, kappa_damping = 0, t_c = 0 /*s*/, Ca = 0, Re = 0;  ///< NaN = unknown
+    double hematocrit = 0.35, gap = 0 /*m*/, kappa_damping = 0, t_c = 0 /*s*/, Ca = 0,
+           Re = 0;  ///< NaN = unknown
   } conditions;
   struct Core {
-    double D = 0, D_sigma = 0;          ///< m2/s
-    double lag = 0;                     ///< s
-    std::array<double, 2> y_range{};    ///< m
+    double D = 0, D_sigma = 0;        ///< m2/s
+    double lag = 0;                   ///< s
+    std::array<double, 2> y_range{};  ///< m
   } core;
   /// D(y) and the drift v(y) WITHOUT D': J = v c - D c'; the Ito drift is v + D'. Empty = homogeneous.
   struct Profile {
-    std::vector<double> y, D, v;                      ///< m, m2/s, m/s
+    std::vector<double> y, D, v;                        ///< m, m2/s, m/s
     std::vector<std::vector<double>> D_draws, v_draws;  ///< posterior draws, each as long as y; may be empty
   } profile;
   double memory = 0;  ///< s, velocity memory time
   struct StepLaw {
-    std::string kind = "gaussian";  ///< gaussian | persistent | heavy_tail
-    double memory = 0;              ///< s, persistent
+    std::string kind = "gaussian";                ///< gaussian | persistent | heavy_tail
+    double memory = 0;                            ///< s, persistent
     double tail_exponent = 0, tail_fraction = 0;  ///< heavy_tail
   } step_law;
   double cell_free_layer = 0;  ///< m; NaN = unknown
