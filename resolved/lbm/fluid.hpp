@@ -1,0 +1,138 @@
+#pragma once
+/// \file Fluid: plasma on one Block, D3Q19 lattice Boltzmann (method 4). Everything in lattice units: dx = dt = 1,
+/// reference density 1, kinematic viscosity (tau - 1/2)/3, pressure (rho - 1)/3.
+/// Node (i, j, k) lies at (i + 1/2, j + 1/2, k + 1/2); x and z are periodic; y is periodic or bounded by two
+/// half-way bounce-back walls at y = 0 and y = ny, which may slide.
+///
+/// A step of a coupled run:
+///     fluid.moments(velocity);                  // once, at the start
+///     loop: ... interpolate velocity, move the solid, spread force ...
+///           fluid.advance(force, velocity);     // collide, stream, and the velocities of the new state
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/array.hpp"
+#include "core/block.hpp"
+#include "core/view.hpp"
+#include "resolved/lbm/collision.hpp"
+
+namespace hemowalk::lbm {
+
+using Vec3 = std::array<double, 3>;  ///< x, y, z
+
+enum class Collision { trt, bgk };
+enum class Forcing { guo, shan_chen };
+
+struct Parameters {
+  double tau = 2;                          ///< relaxation time of the stress, > 1/2
+  Collision collision = Collision::trt;
+  double magic = 3.0 / 16.0;               ///< Lambda = (tau - 1/2)(tau_minus - 1/2), trt only
+  Forcing forcing = Forcing::guo;
+  bool walls_y = true;                     ///< bounce-back walls at y = 0 and y = ny, else periodic y
+  Vec3 lower_wall_velocity{}, upper_wall_velocity{};  ///< the y component must be 0
+  Vec3 body_force{};                       ///< per node and step, in addition to the force field
+};
+
+/// Density and velocity asked of a point (lattice coordinates) when a flow is initialised.
+struct FlowPoint {
+  double density = 1;
+  Vec3 velocity{};
+};
+
+/// Momentum the fluid gave away in the last step, by momentum exchange. The uniform pressure of the reference
+/// density is left out (it would push both walls apart with 1/3 per node).
+struct WallImpulse {
+  Vec3 lower{}, upper{};  ///< to the walls y = 0 and y = ny
+  Vec3 solid{};           ///< to the static solid nodes
+};
+
+/// Sums over all fluid nodes, in double.
+struct Totals {
+  double mass = 0;  ///< sum of rho - 1
+  Vec3 momentum{};  ///< sum of c_i f_i, i.e. before the coming step's force
+};
+
+/// Averages over the fluid nodes of each plane y = j + 1/2.
+struct PlanarProfiles {
+  std::vector<Vec3> velocity;           ///< physical: u* + F/(2 rho)
+  std::vector<double> density;          ///< rho
+  std::vector<double> shear_xy, shear_yz;  ///< viscous stress of the fluid, mu (du_a/dy + du_y/da)
+};
+
+/// D3Q19 fluid, one population set updated in place (AA pattern), SIMD along x, one z-slab per OpenMP thread.
+/// Results do not depend, bit for bit, on the number of threads. No call allocates after construction except
+/// set_solid(), initialise(), profiles(), save().
+/// \tparam Real float or double: the type of populations and arithmetic. Populations are stored as f_i - w_i.
+template <class Real>
+class Fluid {
+ public:
+  /// Fluid at rest with density 1. \throws InputError for tau <= 1/2, a wall moving along y, an empty block.
+  Fluid(const Block& block, const Parameters& parameters);
+
+  const Block& block() const { return block_; }
+  const Parameters& parameters() const { return parameters_; }
+  double viscosity() const { return (parameters_.tau - 0.5) / 3; }
+  std::int64_t steps() const { return steps_; }
+
+  /// Changes wall velocities or the body force between steps (start-up ramps).
+  void set_wall_velocity(const Vec3& lower, const Vec3& upper);
+  void set_body_force(const Vec3& force);
+
+  /// Declares the nodes where \p solid(i, j, k) is true static solid: half-way bounce-back on every link that
+  /// enters them, zero velocity and no force inside. Call before initialise(). Packs of nodes that touch the
+  /// solid run without SIMD.
+  void set_solid(const std::function<bool(int, int, int)>& solid);
+  bool is_solid(int i, int j, int k) const { return !solid_.empty() && solid_[block_.at(i, j, k)]; }
+  std::size_t fluid_nodes() const { return fluid_nodes_; }
+
+  /// Populations = equilibrium + the viscous non-equilibrium part of the given flow, whose gradients are taken
+  /// by central differences over one spacing (exact for a linear profile: a steady Couette flow is steady from
+  /// step 0). \p flow gives the physical velocity; half the body force is taken off. Sets steps() to 0.
+  void initialise(const std::function<FlowPoint(double x, double y, double z)>& flow);
+  /// Flow along z with the profile \p velocity_z(y).
+  void initialise(const std::function<double(double y)>& velocity_z);
+
+  /// Velocity WITHOUT force, u* = sum c_i f_i / rho (method 5.2, step 1), into the interior of a halo field
+  /// (length block().size()); w = rho - 1. Solid nodes get zeros. 76 + 16 bytes per node (float).
+  void moments(View<Node4<Real>> velocity) const;
+
+  /// One step: collision with \p force (halo field, interior read; momentum per node and step; w ignored) plus
+  /// the body force, then streaming. Each node gains exactly its force. An empty view means body force only.
+  void collide_and_stream(View<const Node4<Real>> force);
+
+  /// collide_and_stream(force), then moments(velocity), in one sweep over memory; same result bit for bit.
+  void advance(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+
+  WallImpulse wall_impulse() const;
+  Totals totals() const;
+  /// Profiles of the current state; \p force is the field that acts (or acted last), empty = body force only.
+  PlanarProfiles profiles(View<const Node4<Real>> force) const;
+
+  /// Complete state, exact, independent of thread count and padding. load() wants the same block and Real.
+  std::vector<std::byte> save() const;
+  /// \throws InputError if \p state was not saved by a fluid of the same size and type.
+  void load(View<const std::byte> state);
+
+  /// Bytes that one advance() must move to and from memory per node: populations read and written, force read,
+  /// velocity written (and its line fetched first): the figure for a roofline.
+  static constexpr double bytes_per_node_advance() { return (2 * 19 + 4 + 2 * 4) * sizeof(Real); }
+  /// The same of collide_and_stream() alone.
+  static constexpr double bytes_per_node_collide() { return (2 * 19 + 4) * sizeof(Real); }
+  std::size_t memory_bytes() const;
+
+ private:
+  Block block_;
+  Parameters parameters_;
+  std::int64_t steps_ = 0;
+  std::size_t fluid_nodes_ = 0;
+  std::vector<std::uint8_t> solid_;
+};
+
+extern template class Fluid<float>;
+extern template class Fluid<double>;
+
+}  // namespace hemowalk::lbm
