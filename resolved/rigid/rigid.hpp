@@ -1,0 +1,88 @@
+#pragma once
+/// \file RigidBodies: all rigid cells of one shape, six degrees of freedom each, with the face of
+/// npfem::Membranes.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/array.hpp"
+#include "resolved/mesh/lanes.hpp"
+#include "resolved/mesh/observables.hpp"
+#include "resolved/mesh/rotation.hpp"
+#include "resolved/mesh/step.hpp"
+
+namespace hemowalk::rigid {
+
+/// Shape, own mass and mass metric of one kind of rigid body.
+struct BodyType {
+  mesh::TriangleMesh rest;
+  std::vector<double> mass;    ///< m_k: the body's own inertia (0 is allowed)
+  std::vector<double> metric;  ///< m_k + k a_k: the mass of the implicit step, > 0
+  double h = 1;                ///< solid time step
+};
+
+using mesh::StepOptions;
+using mesh::StepReport;
+
+/// Positions are anchor (double) + R(q) rest, q kept in double; fields as in npfem::Membranes.
+template <class Real>
+class RigidBodies {
+ public:
+  static constexpr int lanes = mesh::lanes_of<Real>;
+  explicit RigidBodies(BodyType type);
+  ~RigidBodies();
+  RigidBodies(RigidBodies&&) noexcept;
+  RigidBodies& operator=(RigidBodies&&) noexcept;
+
+  int count() const;
+  int vertices() const;
+  int batches() const { return (count() + lanes - 1) / lanes; }
+  mesh::Layout<Real> layout() const { return {vertices()}; }
+  const mesh::TriangleMesh& rest() const;
+  const std::vector<double>& vertex_areas() const;
+  double bounding_radius() const;
+  double rest_volume() const;
+  double h() const;
+
+  void reserve(int cells);
+  int add(std::int64_t id, const mesh::Vec3& centre, const mesh::Quaternion& q);
+  void remove(int c);
+  std::int64_t id(int c) const;
+
+  View<const double> anchors() const;
+  View<const Real> offsets() const;
+  View<const Real> velocities() const;
+  View<const Real> normals() const;
+  View<Real> predicted();
+
+  /// Moves every body by h: V and omega such that sum metric (v - v_pred) = 0 and sum r^n x metric (v -
+  /// v_pred) = 0 with v = V + (exp(h omega) - 1) r^n/h, the chord velocity: x^{n+1} = x^n + h v holds as for
+  /// membranes, the shape stays exactly rigid and both momenta are conserved to round-off.
+  StepReport step(const StepOptions& options = {});
+
+  mesh::Vec3 anchor(int c) const;
+  mesh::Vec3 position(int c, int k) const;
+  std::vector<mesh::Vec3> positions(int c) const;
+  void translate(int c, const mesh::Vec3& shift);
+  mesh::Observables observe(int c) const;
+  std::size_t state_bytes() const;
+  void save(int c, std::byte* out) const;
+  int load(const std::byte* in);
+
+  // --- rigid bodies only -------------------------------------------------------------------------------
+  mesh::Quaternion orientation(int c) const;
+  mesh::Vec3 velocity(int c) const;  ///< of the centre
+  mesh::Vec3 angular_velocity(int c) const;
+  void set_motion(int c, const mesh::Vec3& velocity, const mesh::Vec3& angular_velocity);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+extern template class RigidBodies<float>;
+extern template class RigidBodies<double>;
+
+}  // namespace hemowalk::rigid
