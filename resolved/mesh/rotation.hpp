@@ -41,10 +41,10 @@ inline Matrix3 matrix(const Quaternion& q) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
-inline Vec3 apply(const Matrix3& m, const Vec3& v) {
+inline Vec3 transform(const Matrix3& m, const Vec3& v) {
   return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
           m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
 }
-inline Vec3 rotate(const Quaternion& q, const Vec3& v) { return apply(matrix(q), v); }
+inline Vec3 rotate(const Quaternion& q, const Vec3& v) { return transform(matrix(q), v); }
 
 }  // namespace hemowalk::mesh
