@@ -24,11 +24,13 @@ struct Options {
 /// One estimate of D. sigma is one standard error; ci68 from the bootstrap.
 struct Estimate {
   std::string name;
-  double D = 0, sigma = 0;       ///< m2/s
-  std::array<double, 2> ci68{};  ///< m2/s
-  int n = 0;                     ///< platelets (or pairs) used
-  double lag = 0;                ///< s, where one applies
-  std::string note;              ///< empty, or why the value is absent / limited
+  double D = 0, sigma = 0;        ///< m2/s
+  std::array<double, 2> ci68{};   ///< m2/s
+  int n = 0;                      ///< platelets (or pairs) used
+  double lag = 0;                 ///< s, where one applies
+  double effective_samples = 0;   ///< 2 (D/sigma)^2: independent displacements that would give this error
+  double sigma_between_runs = 0;  ///< m2/s, spread of the runs beyond what their cells explain
+  std::string note;               ///< empty, or why the value is absent / limited
 };
 
 /// A curve for charts: ensemble or time-averaged MSD of one layer.
@@ -50,21 +52,25 @@ struct Verdict {
 };
 
 struct Calibration {
+  std::string kind = "platelet";
   int n_platelets = 0;
+  int n_runs = 1;
   double duration = 0;               ///< s
   std::array<double, 2> walls_y{};   ///< m
+  std::array<double, 2> core{};      ///< m, layer in which the displacements of `plateau` start
   std::vector<Estimate> estimators;  ///< paper, paper_all, plateau, gls, green_kubo
   std::vector<MsdCurve> msd;
   struct Profile {
     std::vector<double> y, D, sigma, v, v_sigma, density;  ///< m, m2/s, m2/s, m/s (without D'), 1/m
-  } profile;
+  } profile;  ///< Kramers-Moyal at the plateau lag; the smooth fit is in law.profile
   struct Kurtosis {
     std::vector<double> lag, excess;
   } kurtosis;
   std::vector<Verdict> verdict;
   data::TransportLaw law;  ///< carries the gate's findings
   std::vector<std::string> warnings;
-  double wall = 0;  ///< s
+  double wall = 0;       ///< s
+  std::string law_file;  ///< where the caller wrote the law; empty = not written
 
   const Estimate* find(const std::string& name) const {
     for (const auto& e : estimators)
