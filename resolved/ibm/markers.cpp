@@ -1,6 +1,7 @@
 #include "resolved/ibm/markers.hpp"
 
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "core/check.hpp"
@@ -310,6 +311,41 @@ void Markers<Real>::spread(View<const Node4<Real>> value, View<Node4<Real>> fiel
     case Kernel::phi4:
       return spread_with<Kernel::phi4>(value, field);
   }
+}
+
+template <class Real>
+std::vector<std::byte> Markers<Real>::save() const {
+  std::vector<std::byte> out;
+  if (!sorted_) return out;
+  const auto put = [&](const void* data, std::size_t bytes) {
+    const auto* raw = static_cast<const std::byte*>(data);
+    out.insert(out.end(), raw, raw + bytes);
+  };
+  put(marker_.data(), marker_.size() * sizeof(std::uint32_t));
+  put(slot_.data(), slot_.size() * sizeof(std::uint32_t));
+  put(home_.data(), home_.size() * sizeof(Home));
+  put(slab_begin_.data(), slab_begin_.size() * sizeof(std::uint32_t));
+  return out;
+}
+
+template <class Real>
+void Markers<Real>::load(View<const std::byte> state) {
+  sorted_ = state.size > 0;
+  if (!sorted_) return;
+  const std::size_t bytes = (marker_.size() + slot_.size() + slab_begin_.size()) * sizeof(std::uint32_t) +
+                            home_.size() * sizeof(Home);
+  require(state.size == bytes,
+          "the saved marker order does not fit (another number of markers or another block) use the scene it "
+          "was made with");
+  const std::byte* at = state.data;
+  const auto take = [&](void* data, std::size_t n) {
+    if (n) std::memcpy(data, at, n);
+    at += n;
+  };
+  take(marker_.data(), marker_.size() * sizeof(std::uint32_t));
+  take(slot_.data(), slot_.size() * sizeof(std::uint32_t));
+  take(home_.data(), home_.size() * sizeof(Home));
+  take(slab_begin_.data(), slab_begin_.size() * sizeof(std::uint32_t));
 }
 
 template class Markers<float>;

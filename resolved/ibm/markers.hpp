@@ -8,6 +8,7 @@
 /// so sums do not depend on the number of threads.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -39,6 +40,12 @@ class Markers {
   /// field(x) += sum over markers of phi(x - X_m) value[m], components x, y, z. Adjoint of interpolate.
   /// The field's halo must be folded afterwards (fold_force_halo).
   void spread(View<const Node4<Real>> value, View<Node4<Real>> field) const;
+
+  /// The present sort, exactly: sums depend on the order of markers, and a restart must go on in the same
+  /// order.
+  std::vector<std::byte> save() const;
+  /// \throws InputError if \p state was saved by other markers.
+  void load(View<const std::byte> state);
 
   std::size_t active() const { return active_; }
   /// Sorts made so far; for benchmarks and tests.

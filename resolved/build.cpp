@@ -1,0 +1,159 @@
+#include "resolved/build.hpp"
+
+#include <cmath>
+
+#include "core/check.hpp"
+#include "resolved/mesh/mesh_file.hpp"
+#include "resolved/mesh/shapes.hpp"
+
+namespace hemowalk::resolved {
+
+Block make_block(const data::Scene& scene) {
+  std::array<int, 3> n{};
+  for (int d = 0; d < 3; ++d) {
+    const double nodes = scene.domain.size[d] / scene.fluid.dx;
+    n[d] = static_cast<int>(std::lround(nodes));
+    require(n[d] >= 4 && std::abs(nodes - n[d]) < 1e-6 * nodes, [&] {
+      return "domain.size." + std::to_string(d) + " is " + std::to_string(nodes) +
+             " lattice spacings (it must be a whole number, 4 or more) choose a multiple of fluid.dx";
+    });
+  }
+  return {n[0], n[1], n[2]};
+}
+
+ibm::Faces make_faces(const data::Scene& scene, const LatticeUnits& units) {
+  ibm::Faces faces;
+  faces.periodic_y = scene.domain.geometry == data::Domain::Geometry::periodic;
+  if (scene.flow.type == data::Flow::Type::couette) {
+    const double speed = units.velocity(scene.flow.shear_rate * scene.domain.size[1]);
+    const bool both = scene.flow.walls == data::Flow::Walls::both;
+    faces.lower_wall[2] = both ? -speed / 2 : 0;
+    faces.upper_wall[2] = both ? speed / 2 : speed;
+  }
+  return faces;
+}
+
+ibm::Kernel make_kernel(data::Coupling::Kernel kernel) {
+  switch (kernel) {
+    case data::Coupling::Kernel::phi2:
+      return ibm::Kernel::phi2;
+    case data::Coupling::Kernel::phi3:
+      return ibm::Kernel::phi3;
+    default:
+      return ibm::Kernel::phi4;
+  }
+}
+
+namespace {
+
+/// Pressure gradient that drives a poiseuille flow, N/m3: given, or 12 mu U/H^2 for a mean velocity U in a
+/// slab.
+double driving_force(const data::Scene& scene) {
+  if (scene.flow.type != data::Flow::Type::poiseuille) return 0;
+  if (scene.flow.pressure_gradient) return *scene.flow.pressure_gradient;
+  const double mu = scene.fluid.density * scene.fluid.kinematic_viscosity, H = scene.domain.size[1];
+  return 12 * mu * scene.flow.mean_velocity.value_or(0) / (H * H);
+}
+
+}  // namespace
+
+lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units) {
+  lbm::Parameters p;
+  p.tau = scene.fluid.tau;
+  p.collision =
+      scene.fluid.collision == data::Fluid::Collision::trt ? lbm::Collision::trt : lbm::Collision::bgk;
+  p.magic = scene.fluid.magic;
+  p.forcing = scene.fluid.forcing == data::Fluid::Forcing::guo ? lbm::Forcing::guo : lbm::Forcing::shan_chen;
+  const ibm::Faces faces = make_faces(scene, units);
+  p.walls_y = !faces.periodic_y;
+  p.lower_wall_velocity = faces.lower_wall, p.upper_wall_velocity = faces.upper_wall;
+  p.body_force[2] = units.force_density(driving_force(scene));
+  return p;
+}
+
+double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double y) {
+  const double H = units.length(scene.domain.size[1]);
+  const ibm::Faces faces = make_faces(scene, units);
+  if (faces.periodic_y) return 0;
+  const double nu = (scene.fluid.tau - 0.5) / 3, g = units.force_density(driving_force(scene));
+  return faces.lower_wall[2] + (faces.upper_wall[2] - faces.lower_wall[2]) * y / H +
+         g / (2 * nu) * y * (H - y);
+}
+
+mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit) {
+  using Type = data::Shape::Type;
+  const auto& radii = kind.shape.radii;
+  switch (kind.shape.type) {
+    case Type::rbc:
+      return mesh::red_cell(1e-6 / unit, kind.subdivision);
+    case Type::platelet:
+      return mesh::platelet(1e-6 / unit, kind.subdivision);
+    case Type::sphere:
+      return mesh::sphere(radii[0] / unit, kind.subdivision);
+    case Type::ellipsoid:
+      return mesh::ellipsoid({radii[0] / unit, radii[1] / unit, radii[2] / unit}, kind.subdivision);
+    case Type::mesh:
+      break;
+  }
+  mesh::TriangleMesh m = mesh::read_mesh(kind.shape.file);
+  const mesh::Vec3 centre = mesh::centroid(m);
+  for (auto& v : m.vertices)
+    for (int d = 0; d < 3; ++d) v[d] = (v[d] - centre[d]) * kind.shape.unit / unit;
+  return m;
+}
+
+npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units) {
+  npfem::Material m;
+  switch (kind.law) {
+    case data::Kind::Law::neo_hookean:
+      m.law = npfem::Law::neo_hookean;
+      break;
+    case data::Kind::Law::skalak:
+      m.law = npfem::Law::skalak;
+      break;
+    default:
+      m.law = npfem::Law::paper;
+  }
+  m.B = units.modulus(kind.B), m.C = units.modulus(kind.C), m.D = units.modulus(kind.D);
+  m.Gs = units.modulus(kind.Gs), m.skalak_C = kind.skalak_C;
+  switch (kind.bending.model) {
+    case data::Bending::Model::paper:
+      m.bending = npfem::Bending::paper;
+      break;
+    case data::Bending::Model::helfrich:
+      m.bending = npfem::Bending::helfrich;
+      break;
+    case data::Bending::Model::none:
+      m.bending = npfem::Bending::none;
+      break;
+  }
+  m.bending_modulus = units.bending(kind.bending.modulus);
+  m.reference_curvature = units.curvature(kind.bending.reference_curvature);
+  m.volume_modulus = units.modulus(kind.volume_modulus);
+  m.rayleigh_beta = units.time(kind.rayleigh_beta);
+  // fg/(us um2) = 1e-18 kg / (1e-6 s 1e-12 m2) = 1 kg/(s m2)
+  m.drag_per_area = units.drag_per_area(npfem::drag_per_area_of(kind.kappa_damping));
+  return m;
+}
+
+contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units) {
+  contact::Law law;
+  law.range = units.length(scene.contact.range);
+  law.stiffness = scene.contact.model == data::Contact::Model::none
+                      ? 0
+                      : units.stiffness_density(scene.contact.stiffness / reference_vertex_area);
+  return law;
+}
+
+contact::Domain make_domain(const data::Scene& scene, const Block& block) {
+  contact::Domain domain;
+  const bool walls = scene.domain.geometry != data::Domain::Geometry::periodic;
+  domain.period = {static_cast<double>(block.nx), walls ? 0.0 : block.ny, static_cast<double>(block.nz)};
+  if (walls) {
+    domain.walls.geometry = contact::Walls::Geometry::slab;
+    domain.walls.lower = 0, domain.walls.upper = block.ny;
+  }
+  return domain;
+}
+
+}  // namespace hemowalk::resolved

@@ -1,0 +1,30 @@
+#pragma once
+/// \file From the words of a scene to the solver's structures, in lattice units.
+
+#include "core/block.hpp"
+#include "core/data/scene.hpp"
+#include "resolved/contact/contact.hpp"
+#include "resolved/ibm/markers.hpp"
+#include "resolved/lbm/fluid.hpp"
+#include "resolved/mesh/mesh.hpp"
+#include "resolved/npfem/material.hpp"
+#include "resolved/units.hpp"
+
+namespace hemowalk::resolved {
+
+/// Membrane area per vertex of the paper's red cell, m2: where stiffness per vertex and per area meet.
+inline constexpr double reference_vertex_area = 0.511e-12;
+
+Block make_block(const data::Scene& scene);
+ibm::Faces make_faces(const data::Scene& scene, const LatticeUnits& units);
+ibm::Kernel make_kernel(data::Coupling::Kernel kernel);
+lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units);
+/// Steady velocity along z at height y (lattice units), without cells.
+double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double y);
+/// Rest shape centred at the origin, in units of \p unit metres.
+mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
+npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);
+contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units);
+contact::Domain make_domain(const data::Scene& scene, const Block& block);
+
+}  // namespace hemowalk::resolved
