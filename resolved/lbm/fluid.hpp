@@ -1,8 +1,8 @@
 #pragma once
-/// \file Fluid: plasma on one Block, D3Q19 lattice Boltzmann (method 4). Everything in lattice units: dx = dt = 1,
-/// reference density 1, kinematic viscosity (tau - 1/2)/3, pressure (rho - 1)/3.
-/// Node (i, j, k) lies at (i + 1/2, j + 1/2, k + 1/2); x and z are periodic; y is periodic or bounded by two
-/// half-way bounce-back walls at y = 0 and y = ny, which may slide.
+/// \file Fluid: plasma on one Block, D3Q19 lattice Boltzmann (method 4). Everything in lattice units: dx = dt
+/// = 1, reference density 1, kinematic viscosity (tau - 1/2)/3, pressure (rho - 1)/3. Node (i, j, k) lies at
+/// (i + 1/2, j + 1/2, k + 1/2); x and z are periodic; y is periodic or bounded by two half-way bounce-back
+/// walls at y = 0 and y = ny, which may slide.
 ///
 /// A step of a coupled run:
 ///     fluid.moments(velocity);                  // once, at the start
@@ -19,6 +19,7 @@
 #include "core/block.hpp"
 #include "core/view.hpp"
 #include "resolved/lbm/collision.hpp"
+#include "resolved/lbm/pointers.hpp"
 
 namespace hemowalk::lbm {
 
@@ -28,13 +29,13 @@ enum class Collision { trt, bgk };
 enum class Forcing { guo, shan_chen };
 
 struct Parameters {
-  double tau = 2;                          ///< relaxation time of the stress, > 1/2
+  double tau = 2;  ///< relaxation time of the stress, > 1/2
   Collision collision = Collision::trt;
-  double magic = 3.0 / 16.0;               ///< Lambda = (tau - 1/2)(tau_minus - 1/2), trt only
+  double magic = 3.0 / 16.0;  ///< Lambda = (tau - 1/2)(tau_minus - 1/2), trt only
   Forcing forcing = Forcing::guo;
-  bool walls_y = true;                     ///< bounce-back walls at y = 0 and y = ny, else periodic y
+  bool walls_y = true;  ///< bounce-back walls at y = 0 and y = ny, else periodic y
   Vec3 lower_wall_velocity{}, upper_wall_velocity{};  ///< the y component must be 0
-  Vec3 body_force{};                       ///< per node and step, in addition to the force field
+  Vec3 body_force{};                                  ///< per node and step, in addition to the force field
 };
 
 /// Density and velocity asked of a point (lattice coordinates) when a flow is initialised.
@@ -58,8 +59,8 @@ struct Totals {
 
 /// Averages over the fluid nodes of each plane y = j + 1/2.
 struct PlanarProfiles {
-  std::vector<Vec3> velocity;           ///< physical: u* + F/(2 rho)
-  std::vector<double> density;          ///< rho
+  std::vector<Vec3> velocity;              ///< physical: u* + F/(2 rho)
+  std::vector<double> density;             ///< rho
   std::vector<double> shear_xy, shear_yz;  ///< viscous stress of the fluid, mu (du_a/dy + du_y/da)
 };
 
@@ -89,9 +90,10 @@ class Fluid {
   bool is_solid(int i, int j, int k) const { return !solid_.empty() && solid_[block_.at(i, j, k)]; }
   std::size_t fluid_nodes() const { return fluid_nodes_; }
 
-  /// Populations = equilibrium + the viscous non-equilibrium part of the given flow, whose gradients are taken
-  /// by central differences over one spacing (exact for a linear profile: a steady Couette flow is steady from
-  /// step 0). \p flow gives the physical velocity; half the body force is taken off. Sets steps() to 0.
+  /// Populations = equilibrium + the viscous non-equilibrium part of the given flow, whose gradients are
+  /// taken by central differences over one spacing (exact for a linear profile: a steady Couette flow is
+  /// steady from step 0). \p flow gives the physical velocity; half the body force is taken off. Sets steps()
+  /// to 0.
   void initialise(const std::function<FlowPoint(double x, double y, double z)>& flow);
   /// Flow along z with the profile \p velocity_z(y).
   void initialise(const std::function<double(double y)>& velocity_z);
@@ -100,8 +102,9 @@ class Fluid {
   /// (length block().size()); w = rho - 1. Solid nodes get zeros. 76 + 16 bytes per node (float).
   void moments(View<Node4<Real>> velocity) const;
 
-  /// One step: collision with \p force (halo field, interior read; momentum per node and step; w ignored) plus
-  /// the body force, then streaming. Each node gains exactly its force. An empty view means body force only.
+  /// One step: collision with \p force (halo field, interior read; momentum per node and step; w ignored)
+  /// plus the body force, then streaming. Each node gains exactly its force. An empty view means body force
+  /// only.
   void collide_and_stream(View<const Node4<Real>> force);
 
   /// collide_and_stream(force), then moments(velocity), in one sweep over memory; same result bit for bit.
@@ -117,19 +120,60 @@ class Fluid {
   /// \throws InputError if \p state was not saved by a fluid of the same size and type.
   void load(View<const std::byte> state);
 
-  /// Bytes that one advance() must move to and from memory per node: populations read and written, force read,
-  /// velocity written (and its line fetched first): the figure for a roofline.
+  /// Bytes that one advance() must move to and from memory per node: populations read and written, force
+  /// read, velocity written (and its line fetched first): the figure for a roofline.
   static constexpr double bytes_per_node_advance() { return (2 * 19 + 4 + 2 * 4) * sizeof(Real); }
   /// The same of collide_and_stream() alone.
   static constexpr double bytes_per_node_collide() { return (2 * 19 + 4) * sizeof(Real); }
   std::size_t memory_bytes() const;
 
  private:
+  struct Slab {
+    int begin, end;  ///< planes of one thread
+  };
+  Slab slab() const;
+  std::size_t row(int j, int k) const { return rows_[(k + 1) * (std::size_t(block_.ny) + 2) + (j + 1)]; }
+  bool below(int j) const { return parameters_.walls_y && j < 0; }
+  bool above(int j) const { return parameters_.walls_y && j >= block_.ny; }
+  void set_wall_terms();
+  RowPointers<Real> locate(int j, int k, bool swapped) const;
+  void locate_node(int i, int j, int k, bool swapped, Real* (&p)[directions],
+                   Real (&wall_term)[directions]) const;
+  void populations(int i, int j, int k, double (&f)[directions]) const;
+  void set_populations(int i, int j, int k, const std::function<FlowPoint(double, double, double)>& flow);
+  void collide_row(int j, int k, View<const Node4<Real>> force);
+  void collide_node(int i, int j, int k, const Node4<Real>* force, double (&outgoing)[3],
+                    double (&to_solid)[3]);
+  void moments_row(int j, int k, bool swapped, View<Node4<Real>> velocity) const;
+  void fill_ghosts(int j, int k);
+  void return_ghosts(int j, int k, const RowPointers<Real>& pointers);
+  template <bool with_moments>
+  void step(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+
   Block block_;
   Parameters parameters_;
+  Relaxation<Real> rate_;
   std::int64_t steps_ = 0;
   std::size_t fluid_nodes_ = 0;
-  std::vector<std::uint8_t> solid_;
+
+  // Row (j, k) is [direction][x], each direction padded to a multiple of 16 with room for x = nx and, at the
+  // end of the direction before, x = -1. rows_ maps j in [-1, ny], k in [-1, nz] to the row's first element:
+  // periodic images now, rows received from other ranks where the domain is divided.
+  std::size_t pitch_ = 0;
+  std::vector<std::size_t> rows_;
+  Array<Real> f_;
+  bool swapped_ =
+      false;  ///< after an odd number of steps: collided populations wait in their opposite's slot
+
+  std::array<std::array<Real, directions>, 2> wall_term_{};  ///< 6 w_i c_i . u_wall where i leaves the wall
+  std::array<Vec3, 2> wall_impulse_per_node_{};              ///< the part of the impulse due to wall_term_
+  std::vector<Vec3> wall_sum_;                               ///< [2][nz] impulse of the last step
+  std::vector<Vec3> solid_sum_;                              ///< [nz][ny], empty without solid
+
+  enum Kind : std::uint8_t { solid_node, bulk_node, border_node };  ///< border: a neighbour is solid
+  std::vector<std::uint8_t> solid_;                                 ///< with halo (periodic images)
+  std::vector<std::uint8_t> kind_;                                  ///< interior nodes
+  std::vector<std::uint8_t> mixed_;  ///< [nz][ny]: the row has nodes that are not bulk
 };
 
 extern template class Fluid<float>;

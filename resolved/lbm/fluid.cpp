@@ -1,0 +1,319 @@
+#include "resolved/lbm/fluid.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <string>
+
+#include "core/check.hpp"
+#include "resolved/lbm/rows.hpp"
+
+namespace hemowalk::lbm {
+
+namespace {
+
+constexpr std::size_t round_up(std::size_t n, std::size_t to) { return (n + to - 1) / to * to; }
+
+double omega_minus(const Parameters& p) {
+  return p.collision == Collision::bgk ? 1 / p.tau : 1 / (0.5 + p.magic / (p.tau - 0.5));
+}
+double force_shift(const Parameters& p) {
+  return p.forcing == Forcing::guo ? 0.5 - 1 / (8 * p.tau) : p.tau / 2;
+}
+
+}  // namespace
+
+template <class Real>
+Fluid<Real>::Fluid(const Block& block, const Parameters& parameters)
+    : block_(block), parameters_(parameters) {
+  require(block.nx > 0 && block.ny > 0 && block.nz > 0,
+          "empty fluid block (a size is zero or negative) give every axis at least one node");
+  require(parameters.tau > 0.5, "tau = " + std::to_string(parameters.tau) +
+                                    " (the viscosity (tau - 1/2)/3 must be positive) choose tau > 0.5");
+  require(parameters.collision == Collision::bgk || parameters.magic > 0,
+          "magic = " + std::to_string(parameters.magic) + " (TRT needs Lambda > 0) use 0.1875");
+  require(!parameters.walls_y || block.ny >= 2,
+          "one node between the walls (a row cannot touch both) give y at least two nodes");
+  rate_ = Relaxation<Real>::make(1 / parameters.tau, omega_minus(parameters), force_shift(parameters));
+  fluid_nodes_ = block.interior();
+  pitch_ = round_up(static_cast<std::size_t>(block.nx) + 2, 16);
+  const auto ny = static_cast<std::size_t>(block.ny), nz = static_cast<std::size_t>(block.nz);
+  rows_.resize((ny + 2) * (nz + 2));
+  for (std::size_t k = 0; k < nz + 2; ++k)
+    for (std::size_t j = 0; j < ny + 2; ++j)
+      rows_[k * (ny + 2) + j] = ((k + nz - 1) % nz * ny + (j + ny - 1) % ny) * directions * pitch_;
+  f_ = Array<Real>(ny * nz * directions * pitch_);
+  wall_sum_.resize(2 * nz);
+  set_wall_terms();
+}
+
+template <class Real>
+void Fluid<Real>::set_wall_terms() {
+  const Vec3 u[2] = {parameters_.lower_wall_velocity, parameters_.upper_wall_velocity};
+  for (int w = 0; w < 2; ++w) {
+    require(u[w][1] == 0, "a wall moves along y (it would compress the fluid) set the y component to 0");
+    wall_term_[w].fill(0);
+    wall_impulse_per_node_[w] = {};
+    for (int i = 0; i < directions; ++i) {
+      if (!leaves(w == 0 ? Wall::lower : Wall::upper, i)) continue;
+      const Real term = Real(6 * weight(i) * (c[i][0] * u[w][0] + c[i][2] * u[w][2]));
+      wall_term_[w][i] = term;
+      for (int a = 0; a < 3; ++a) wall_impulse_per_node_[w][a] -= c[i][a] * static_cast<double>(term);
+    }
+  }
+}
+
+template <class Real>
+void Fluid<Real>::set_wall_velocity(const Vec3& lower, const Vec3& upper) {
+  parameters_.lower_wall_velocity = lower;
+  parameters_.upper_wall_velocity = upper;
+  set_wall_terms();
+}
+
+template <class Real>
+void Fluid<Real>::set_body_force(const Vec3& force) {
+  parameters_.body_force = force;
+}
+
+template <class Real>
+typename Fluid<Real>::Slab Fluid<Real>::slab() const {
+  const long threads = omp_get_num_threads(), t = omp_get_thread_num();
+  return {static_cast<int>(block_.nz * t / threads), static_cast<int>(block_.nz * (t + 1) / threads)};
+}
+
+// ---- where populations are stored
+
+template <class Real>
+RowPointers<Real> Fluid<Real>::locate(int j, int k, bool swapped) const {
+  auto* f = const_cast<Real*>(f_.data());
+  RowPointers<Real> result;
+  unroll<directions>([&](auto direction) {
+    constexpr int i = decltype(direction)::value;
+    const bool low = below(j - c[i][1]), high = above(j - c[i][1]);
+    result.wall_term[i] = 0;
+    if (!swapped) {
+      result.p[i] = f + row(j, k) + i * pitch_;
+    } else if (low || high) {  // came back from the wall: it waits in the node's own slot
+      result.p[i] = f + row(j, k) + i * pitch_;
+      result.wall_term[i] = wall_term_[high][i];
+    } else {
+      result.p[i] = f + row(j - c[i][1], k - c[i][2]) + opposite(i) * pitch_ - c[i][0];
+    }
+  });
+  return result;
+}
+
+/// The same for one node beside static solid, whose links may end there.
+template <class Real>
+void Fluid<Real>::locate_node(int i, int j, int k, bool swapped, Real* (&p)[directions],
+                              Real (&wall_term)[directions]) const {
+  auto* f = const_cast<Real*>(f_.data());
+  for (int d = 0; d < directions; ++d) {
+    const int x = i - c[d][0], y = j - c[d][1], z = k - c[d][2];
+    const bool low = below(y), high = above(y);
+    wall_term[d] = 0;
+    if (!swapped || low || high || is_solid(x, y, z)) {
+      p[d] = f + row(j, k) + d * pitch_ + i;
+      if (swapped && (low || high)) wall_term[d] = wall_term_[high][d];
+    } else {
+      p[d] = f + row(y, z) + opposite(d) * pitch_ + (x + block_.nx) % block_.nx;
+    }
+  }
+}
+
+/// Slots of the columns x = -1 and x = nx that the coming odd step reads in this row.
+template <class Real>
+void Fluid<Real>::fill_ghosts(int j, int k) {
+  Real* own = f_.data() + row(j, k);
+  unroll<directions>([&](auto direction) {
+    constexpr int i = decltype(direction)::value;
+    Real* slot = own + i * pitch_;
+    if constexpr (c[i][0] == -1) slot[-1] = slot[block_.nx - 1];
+    if constexpr (c[i][0] == 1) slot[block_.nx] = slot[0];
+  });
+}
+
+/// After an odd step of row (j, k): what it wrote to columns x = -1 and x = nx goes to their periodic images.
+template <class Real>
+void Fluid<Real>::return_ghosts(int j, int k, const RowPointers<Real>& row) {
+  const int n = block_.nx;
+  const std::size_t first = (static_cast<std::size_t>(k) * block_.ny + j) * n;
+  const bool left = kind_.empty() || kind_[first] == bulk_node,
+             right = kind_.empty() || kind_[first + n - 1] == bulk_node;
+  unroll<directions>([&](auto direction) {
+    constexpr int i = decltype(direction)::value;
+    if (below(j - c[i][1]) || above(j - c[i][1])) return;
+    if constexpr (c[i][0] == 1) {
+      if (left) row.p[i][n] = row.p[i][0];
+    }
+    if constexpr (c[i][0] == -1) {
+      if (right) row.p[i][-1] = row.p[i][n - 1];
+    }
+  });
+}
+
+// ---- one row
+
+template <class Real>
+void Fluid<Real>::collide_node(int i, int j, int k, const Node4<Real>* force, double (&outgoing)[3],
+                               double (&to_solid)[3]) {
+  Real* p[directions];
+  Real wall_term[directions], f[directions];
+  locate_node(i, j, k, swapped_, p, wall_term);
+  for (int d = 0; d < directions; ++d) f[d] = *p[d] + wall_term[d];
+  Node4<Real> F{Real(parameters_.body_force[0]), Real(parameters_.body_force[1]),
+                Real(parameters_.body_force[2]), 0};
+  if (force) F = {F.x + force->x, F.y + force->y, F.z + force->z, 0};
+  collide(f, F.x, F.y, F.z, rate_);
+  for (int d = 0; d < directions; ++d) {
+    const int x = i + c[d][0], y = j + c[d][1], z = k + c[d][2];
+    const bool wall = below(y) || above(y);
+    if (wall || is_solid(x, y, z))
+      for (int a = 0; a < 3; ++a) (wall ? outgoing : to_solid)[a] += c[d][a] * static_cast<double>(f[d]);
+    *p[opposite(d)] = f[d] + wall_term[opposite(d)];
+  }
+}
+
+template <class Real>
+void Fluid<Real>::collide_row(int j, int k, View<const Node4<Real>> force) {
+  const RowPointers<Real> pointers = locate(j, k, swapped_);
+  const Node4<Real>* F = force.data ? force.data + block_.at(0, j, k) : nullptr;
+  const Force3<Real> body{Real(parameters_.body_force[0]), Real(parameters_.body_force[1]),
+                          Real(parameters_.body_force[2])};
+  const auto ahead = static_cast<std::ptrdiff_t>(directions * pitch_);
+  const Wall wall = below(j - 1) ? Wall::lower : above(j + 1) ? Wall::upper : Wall::none;
+  double outgoing[3] = {}, to_solid[3] = {};
+  const auto run = [&](int begin, int end) {
+    if (wall == Wall::lower) {
+      collide_run<Wall::lower>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+    } else if (wall == Wall::upper) {
+      collide_run<Wall::upper>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+    } else {
+      collide_run<Wall::none>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+    }
+  };
+  const std::size_t r = static_cast<std::size_t>(k) * block_.ny + j;
+  int fluid = block_.nx;
+  if (mixed_.empty() || !mixed_[r]) {
+    run(0, block_.nx);
+  } else {
+    fluid = 0;
+    const std::uint8_t* kind = kind_.data() + r * block_.nx;
+    for (int x = 0; x < block_.nx;) {
+      int end = x + 1;
+      if (kind[x] == bulk_node) {
+        while (end < block_.nx && kind[end] == bulk_node) ++end;
+        run(x, end);
+      } else if (kind[x] == border_node) {
+        collide_node(x, j, k, F ? F + x : nullptr, outgoing, to_solid);
+      }
+      if (kind[x] != solid_node) fluid += end - x;
+      x = end;
+    }
+    for (int a = 0; a < 3; ++a) solid_sum_[r][a] = 2 * to_solid[a];
+  }
+  if (swapped_) {
+    return_ghosts(j, k, pointers);
+  } else {
+    fill_ghosts(j, k);
+  }
+  if (wall != Wall::none) {
+    const int w = wall == Wall::upper;
+    for (int a = 0; a < 3; ++a)
+      wall_sum_[w * static_cast<std::size_t>(block_.nz) + k][a] =
+          2 * outgoing[a] + fluid * wall_impulse_per_node_[w][a];
+  }
+}
+
+template <class Real>
+void Fluid<Real>::moments_row(int j, int k, bool swapped, View<Node4<Real>> velocity) const {
+  const RowPointers<Real> pointers = locate(j, k, swapped);
+  Node4<Real>* out = velocity.data + block_.at(0, j, k);
+  const Wall wall = below(j - 1) ? Wall::lower : above(j + 1) ? Wall::upper : Wall::none;
+  const auto run = [&](int begin, int end) {
+    if (wall == Wall::lower) {
+      moments_run<Wall::lower>(pointers, begin, end, out);
+    } else if (wall == Wall::upper) {
+      moments_run<Wall::upper>(pointers, begin, end, out);
+    } else {
+      moments_run<Wall::none>(pointers, begin, end, out);
+    }
+  };
+  const std::size_t r = static_cast<std::size_t>(k) * block_.ny + j;
+  if (mixed_.empty() || !mixed_[r]) return run(0, block_.nx);
+  const std::uint8_t* kind = kind_.data() + r * block_.nx;
+  for (int x = 0; x < block_.nx;) {
+    int end = x + 1;
+    if (kind[x] == bulk_node) {
+      while (end < block_.nx && kind[end] == bulk_node) ++end;
+      run(x, end);
+    } else if (kind[x] == border_node) {
+      Real* p[directions];
+      Real wall_term[directions], f[directions];
+      locate_node(x, j, k, swapped, p, wall_term);
+      for (int d = 0; d < directions; ++d) f[d] = *p[d] + wall_term[d];
+      split_parities(f);
+      const Moments<Real> m = moments_of_parities(f);
+      const Real inverse_density = 1 / (1 + m.density);
+      out[x] = {m.x * inverse_density, m.y * inverse_density, m.z * inverse_density, m.density};
+    } else {
+      out[x] = {0, 0, 0, 0};
+    }
+    x = end;
+  }
+}
+
+// ---- the sweeps
+
+template <class Real>
+void Fluid<Real>::moments(View<Node4<Real>> velocity) const {
+#pragma omp parallel
+  {
+    const Slab my = slab();
+    for (int k = my.begin; k < my.end; ++k)
+      for (int j = 0; j < block_.ny; ++j) moments_row(j, k, swapped_, velocity);
+  }
+}
+
+/// With moments, row (j - 1, k - 1) follows row (j, k): the rows it gathers from are then all collided and
+/// still in cache. The first and last plane of a slab wait for the neighbour threads.
+template <class Real>
+template <bool with_moments>
+void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+  const int ny = block_.ny;
+#pragma omp parallel
+  {
+    const Slab my = slab();
+    for (int k = my.begin; k < my.end; ++k) {
+      const bool follow = with_moments && k >= my.begin + 2;
+      for (int j = 0; j < ny; ++j) {
+        collide_row(j, k, force);
+        if (follow && j >= 2) moments_row(j - 1, k - 1, !swapped_, velocity);
+      }
+      if (follow && ny > 1) moments_row(ny - 1, k - 1, !swapped_, velocity);
+      if (follow) moments_row(0, k - 1, !swapped_, velocity);
+    }
+    if constexpr (with_moments) {
+#pragma omp barrier
+      for (int k = my.begin; k < my.end; k += std::max(1, my.end - 1 - my.begin))
+        for (int j = 0; j < ny; ++j) moments_row(j, k, !swapped_, velocity);
+    }
+  }
+  swapped_ = !swapped_;
+  ++steps_;
+}
+
+template <class Real>
+void Fluid<Real>::collide_and_stream(View<const Node4<Real>> force) {
+  step<false>(force, {});
+}
+
+template <class Real>
+void Fluid<Real>::advance(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+  step<true>(force, velocity);
+}
+
+template class Fluid<float>;
+template class Fluid<double>;
+
+}  // namespace hemowalk::lbm

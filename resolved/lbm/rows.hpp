@@ -1,0 +1,136 @@
+#pragma once
+/// \file The two inner loops of the host fluid, SIMD along x: collide a run of nodes in place, and take
+/// moments.
+///
+/// Both see a row through 19 pointers: p[i][x] is where population i of node x is stored *now*. In the AA
+/// pattern the collided population i goes where its opposite was read, p[opposite(i)][x], in even and odd
+/// steps alike; only the pointers differ (own slots, or the opposite slots of the neighbours). Every number
+/// is touched by one node alone, so rows and threads may run in any order.
+
+#include "resolved/lbm/node_packs.hpp"
+#include "resolved/lbm/pointers.hpp"
+
+namespace hemowalk::lbm {
+
+template <class Real>
+struct Force3 {
+  Real x, y, z;
+};
+
+namespace detail {
+
+/// Loads the populations of W nodes from x on; lanes from \p active on are zero and are not touched in
+/// memory.
+template <Wall wall, bool whole, class Real, class N>
+HEMO_INLINE void load_populations(const RowPointers<Real>& row, int x, int active, N (&f)[directions]) {
+  constexpr int W = lanes<Real>;
+  const N index([](auto l) { return Real(int(l)); });
+  const auto mask = index < Real(active);
+  unroll<directions>([&](auto direction) {
+    constexpr int i = decltype(direction)::value;
+    if constexpr (whole) {
+      f[i] = load<Real, W>(row.p[i] + x);
+    } else {
+      f[i] = 0;
+      where(mask, f[i]).copy_from(row.p[i] + x, stdx::element_aligned);
+    }
+    if constexpr (leaves(wall, i)) f[i] += row.wall_term[i];
+  });
+}
+
+/// Momentum carried towards the wall by the collided populations \p f, added to \p sum in double.
+template <Wall wall, bool whole, class N>
+HEMO_INLINE void add_outgoing(const N (&f)[directions], int active, double (&sum)[3]) {
+  for (int l = 0; l < (whole ? int(N::size()) : active); ++l) {
+    unroll<directions>([&](auto direction) {
+      constexpr int i = decltype(direction)::value;
+      if constexpr (leaves(wall, opposite(i))) {
+        for (int a = 0; a < 3; ++a) sum[a] += c[i][a] * static_cast<double>(f[i][l]);
+      }
+    });
+  }
+}
+
+template <Wall wall, bool whole, class Real>
+HEMO_INLINE void collide_pack(const RowPointers<Real>& row, int x, int active, const Node4<Real>* force,
+                              const Force3<Real>& body, const Relaxation<Real>& rate, std::ptrdiff_t ahead,
+                              double (&outgoing)[3]) {
+  constexpr int W = lanes<Real>;
+  using N = Pack<Real, W>;
+  N f[directions];
+  load_populations<wall, whole>(row, x, active, f);
+  N fx(body.x), fy(body.y), fz(body.z);
+  if (force) {
+    N x4, y4, z4;
+    if constexpr (whole) {
+      load_nodes<Real, W>(force + x, x4, y4, z4);
+    } else {
+      Node4<Real> nodes[W] = {};
+      for (int l = 0; l < active; ++l) nodes[l] = force[x + l];
+      load_nodes<Real, W>(nodes, x4, y4, z4);
+    }
+    fx += x4;
+    fy += y4;
+    fz += z4;
+  }
+  collide(f, fx, fy, fz, rate);
+  if constexpr (wall != Wall::none) add_outgoing<wall, whole>(f, active, outgoing);
+  const N index([](auto l) { return Real(int(l)); });
+  const auto mask = index < Real(active);
+  unroll<directions>([&](auto direction) {
+    constexpr int i = decltype(direction)::value, o = opposite(i);
+    if constexpr (leaves(wall, o)) f[i] += row.wall_term[o];
+    if constexpr (whole) {
+      store<Real, W>(f[i], row.p[o] + x);
+      __builtin_prefetch(row.p[o] + x + ahead, 1, 3);
+    } else {
+      where(mask, f[i]).copy_to(row.p[o] + x, stdx::element_aligned);
+    }
+  });
+}
+
+template <Wall wall, bool whole, class Real>
+HEMO_INLINE void moments_pack(const RowPointers<Real>& row, int x, int active, Node4<Real>* velocity) {
+  constexpr int W = lanes<Real>;
+  using N = Pack<Real, W>;
+  N f[directions];
+  load_populations<wall, whole>(row, x, active, f);
+  split_parities(f);
+  const Moments<N> m = moments_of_parities(f);
+  const N inverse_density = Real(1) / (Real(1) + m.density);
+  const N ux = m.x * inverse_density, uy = m.y * inverse_density, uz = m.z * inverse_density;
+  if constexpr (whole) {
+    store_nodes<Real, W>(ux, uy, uz, m.density, velocity + x);
+  } else {
+    Node4<Real> nodes[W];
+    store_nodes<Real, W>(ux, uy, uz, m.density, nodes);
+    for (int l = 0; l < active; ++l) velocity[x + l] = nodes[l];
+  }
+}
+
+}  // namespace detail
+
+/// Collides nodes begin .. end-1 of a row in place. \p force may be null. \p ahead is the distance in memory
+/// to the row that comes next (prefetched). \p outgoing gains the momentum that populations carry towards the
+/// wall.
+template <Wall wall, class Real>
+void collide_run(const RowPointers<Real>& row, int begin, int end, const Node4<Real>* force,
+                 const Force3<Real>& body, const Relaxation<Real>& rate, std::ptrdiff_t ahead,
+                 double (&outgoing)[3]) {
+  constexpr int W = lanes<Real>;
+  int x = begin;
+  for (; x + W <= end; x += W)
+    detail::collide_pack<wall, true>(row, x, W, force, body, rate, ahead, outgoing);
+  if (x < end) detail::collide_pack<wall, false>(row, x, end - x, force, body, rate, ahead, outgoing);
+}
+
+/// u* and rho - 1 of nodes begin .. end-1 of a row.
+template <Wall wall, class Real>
+void moments_run(const RowPointers<Real>& row, int begin, int end, Node4<Real>* velocity) {
+  constexpr int W = lanes<Real>;
+  int x = begin;
+  for (; x + W <= end; x += W) detail::moments_pack<wall, true>(row, x, W, velocity);
+  if (x < end) detail::moments_pack<wall, false>(row, x, end - x, velocity);
+}
+
+}  // namespace hemowalk::lbm
