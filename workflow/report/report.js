@@ -101,9 +101,10 @@ function msdCharts() {
       const m = curve(calibrationOf(p), method, layer);
       if (!m) return;
       series.push({name: many ? p.label : "measured", x: m.lag_s, y: m.msd_m2, sigma: m.sigma_m2, color: palette(i)});
-      if (isNumber(m.fit_slope_m2_per_s) && m.fit_slope_m2_per_s > 0) {
-        const [a, b] = m.fit_range_s, n = 40, x = Array.from({length: n}, (_, k) => a + (b - a) * k / (n - 1));
-        series.push({name: `fit: D = ${scientific(m.fit_slope_m2_per_s / 2)} m²/s`, x, y: x.map(t => m.fit_intercept_m2 + m.fit_slope_m2_per_s * t),
+      const fit = m.fit || {};
+      if (isNumber(fit.slope_m2_per_s) && fit.slope_m2_per_s > 0) {
+        const [a, b] = fit.range_s, n = 40, x = Array.from({length: n}, (_, k) => a + (b - a) * k / (n - 1));
+        series.push({name: `fit: D = ${scientific(fit.slope_m2_per_s / 2)} m²/s`, x, y: x.map(t => fit.intercept_m2 + fit.slope_m2_per_s * t),
                      color: many ? palette(i) : css("--accent"), dash: [7, 5], width: 2});
       }
     });
@@ -137,7 +138,7 @@ function literature() {
   });
   const first = points.map(p => calibrationOf(p)).find(c => c && c.verdict && c.verdict.length);
   const published = first ? first.verdict.filter(v => isNumber(v.D_m2_per_s)) : [];
-  published.forEach(v => rows.push({label: v.source + (v.matched_conditions ? "" : " (other conditions)"), value: v.D_m2_per_s, lo: v.D_lo_m2_per_s, hi: v.D_hi_m2_per_s, soft: !v.matched_conditions}));
+  published.forEach(v => rows.push({label: v.source + (v.matched_conditions ? "" : " (other conditions)"), value: v.D_m2_per_s, lo: v.D_lo, hi: v.D_hi, soft: !v.matched_conditions}));
   if (!rows.length) return;
   const s = section("D beside the literature");
   forestPlot(s, {title: `Diffusion coefficient of ${kindName(kind)}`, unit: "D (m²/s)", rows, failed: anyFailed(),
@@ -158,7 +159,7 @@ function localLaw() {
     if (series.length) lineChart(grid, {title, note, x: {label: "distance from the lower wall y (µm)", scale: um}, y: {label, scale}, series, failed: anyFailed(), ...extra});
   };
   chart("D(y)", "Kramers-Moyal at the plateau lag; biased low within about 2 µm of a wall.", "D (10⁻¹⁰ m²/s)", 1e10, "D_m2_per_s", "sigma");
-  chart("Drift v(y)", "Without the gradient of D: the flux is J = v c − D c′.", "v (µm/s)", um, "v_m_per_s", "v_sigma_m_per_s", {hlines: [{at: 0, label: ""}]});
+  chart("Drift v(y)", "Without the gradient of D: the flux is J = v c − D c′.", "v (µm/s)", um, "v_m_per_s", "v_sigma", {hlines: [{at: 0, label: ""}]});
   chart("Where the cells are", "Density of the analysed cells, all samples after the transient.", "density (1/µm)", 1e-6, "density_1_per_m");
 }
 

@@ -1,0 +1,51 @@
+#pragma once
+/// \file Child processes: a run that crashes takes nothing but itself down.
+
+#include <sys/types.h>
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hemowalk::workflow {
+
+/// How a child ended: exactly one of the two is set.
+struct Ending {
+  std::optional<int> exit_code;
+  std::optional<int> signal;
+};
+
+/// A running child of this process. It gets SIGTERM when this process dies, so that it can write a checkpoint.
+class Child {
+ public:
+  /// Starts \p arguments[0] with stdout and stderr appended to \p log_file, in this process's environment with
+  /// \p environment on top. \throws IoError
+  Child(const std::vector<std::string>& arguments, const std::string& log_file,
+        const std::map<std::string, std::string>& environment = {});
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  /// Kills a child that is still there and waits for it.
+  ~Child();
+
+  pid_t pid() const { return pid_; }
+  /// Empty while it runs.
+  std::optional<Ending> poll();
+  void signal(int number) const;
+
+ private:
+  pid_t pid_ = -1;
+  std::optional<Ending> ending_;
+};
+
+/// "exit code 3", "killed by signal 11 (Segmentation fault)".
+std::string describe(const Ending& ending);
+
+/// Path of the running program.
+std::string this_program();
+
+/// SIGTERM, SIGINT and SIGUSR1 set a flag instead of ending the program; a second SIGINT ends it at once.
+void catch_stop_signals();
+bool stop_requested();
+
+}  // namespace hemowalk::workflow
