@@ -1,0 +1,11 @@
+if(NOT TARGET hemowalk_contact OR NOT TARGET hemowalk_mesh)
+  return()
+endif()
+
+hemowalk_test(test_contact
+  SOURCES unit/test_contact_geometry.cpp unit/test_contact_forces.cpp LINK hemowalk_contact hemowalk_mesh LABELS unit)
+find_package(benchmark QUIET)
+if(benchmark_FOUND)
+  add_executable(bench_contact benchmarks/bench_contact.cpp)
+  target_link_libraries(bench_contact PRIVATE hemowalk_contact hemowalk_mesh benchmark::benchmark)
+endif()
