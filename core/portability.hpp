@@ -10,9 +10,11 @@
 #if defined(__GNUC__) || defined(__CUDACC__)
 #define HEMO_RESTRICT __restrict__
 #define HEMO_INLINE inline __attribute__((always_inline))
+#define HEMO_INLINE_LAMBDA __attribute__((always_inline))  // after a lambda's parameter list
 #else
 #define HEMO_RESTRICT
 #define HEMO_INLINE inline
+#define HEMO_INLINE_LAMBDA
 #endif
 
 namespace hemowalk {

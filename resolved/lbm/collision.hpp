@@ -44,7 +44,7 @@ struct Moments {
 /// second.
 template <class N>
 HEMO_HD HEMO_INLINE void split_parities(N (&f)[directions]) {
-  unroll<9>([&](auto pair) {
+  unroll<9>([&](auto pair) HEMO_INLINE_LAMBDA {
     constexpr int i = 2 * decltype(pair)::value + 1;
     const N first = f[i], second = f[i + 1];
     f[i] = first + second;
@@ -81,7 +81,7 @@ HEMO_HD HEMO_INLINE void collide(N (&f)[directions], const N& fx, const N& fy, c
   const N ax = Real(3) * (rate.omega_minus * m.x + fx), ay = Real(3) * (rate.omega_minus * m.y + fy),
           az = Real(3) * (rate.omega_minus * m.z + fz);
   f[0] = Real(2) * rate.keep_plus * f[0] + Real(weight(0)) * isotropic;
-  unroll<9>([&](auto pair) {
+  unroll<9>([&](auto pair) HEMO_INLINE_LAMBDA {
     constexpr int i = 2 * decltype(pair)::value + 1;
     constexpr Real w = Real(weight(i));
     const N target = (isotropic + along<i>(ux, uy, uz) * along<i>(hx, hy, hz)) +

@@ -25,7 +25,9 @@ HEMO_HD constexpr double weight(int i) { return i == 0 ? 1.0 / 3 : i < 7 ? 1.0 /
 /// body(integral_constant 0) ... body(integral_constant N-1), really unrolled.
 template <int N, class Body>
 HEMO_HD HEMO_INLINE constexpr void unroll(Body&& body) {
-  [&]<int... I>(std::integer_sequence<int, I...>) { (body(std::integral_constant<int, I>{}), ...); }
+  [&]<int... I>(std::integer_sequence<int, I...>) HEMO_INLINE_LAMBDA {
+    (body(std::integral_constant<int, I>{}), ...);
+  }
   (std::make_integer_sequence<int, N>{});
 }
 

@@ -87,7 +87,7 @@ template <class Real>
 RowPointers<Real> Fluid<Real>::locate(int j, int k, bool swapped) const {
   auto* f = const_cast<Real*>(f_.data());
   RowPointers<Real> result;
-  unroll<directions>([&](auto direction) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value;
     const bool low = below(j - c[i][1]), high = above(j - c[i][1]);
     result.wall_term[i] = 0;
@@ -125,7 +125,7 @@ void Fluid<Real>::locate_node(int i, int j, int k, bool swapped, Real* (&p)[dire
 template <class Real>
 void Fluid<Real>::fill_ghosts(int j, int k) {
   Real* own = f_.data() + row(j, k);
-  unroll<directions>([&](auto direction) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value;
     Real* slot = own + i * pitch_;
     if constexpr (c[i][0] == -1) slot[-1] = slot[block_.nx - 1];
@@ -140,7 +140,7 @@ void Fluid<Real>::return_ghosts(int j, int k, const RowPointers<Real>& row) {
   const std::size_t first = (static_cast<std::size_t>(k) * block_.ny + j) * n;
   const bool left = kind_.empty() || kind_[first] == bulk_node,
              right = kind_.empty() || kind_[first + n - 1] == bulk_node;
-  unroll<directions>([&](auto direction) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value;
     if (below(j - c[i][1]) || above(j - c[i][1])) return;
     if constexpr (c[i][0] == 1) {

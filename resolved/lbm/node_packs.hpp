@@ -46,7 +46,7 @@ struct Transpose {
                            __builtin_shufflevector(x, y, (I < half ? half + I : W + I)...)};
     const Vector high[2] = {__builtin_shufflevector(z, w, (I < half ? I : W + I - half)...),
                             __builtin_shufflevector(z, w, (I < half ? half + I : W + I)...)};
-    unroll<4>([&](auto part) {
+    unroll<4>([&](auto part) HEMO_INLINE_LAMBDA {
       constexpr int first = (decltype(part)::value % 2) * quarter;  // node within the half
       const Vector v =
           __builtin_shufflevector(low[decltype(part)::value / 2], high[decltype(part)::value / 2],
@@ -68,9 +68,9 @@ HEMO_INLINE void load_nodes(const Node4<Real>* nodes, Pack<Real, W>& x, Pack<Rea
     y = load<Real, W>(reinterpret_cast<const Real*>(&vy));
     z = load<Real, W>(reinterpret_cast<const Real*>(&vz));
   } else {
-    x = Pack<Real, W>([&](auto l) { return nodes[l].x; });
-    y = Pack<Real, W>([&](auto l) { return nodes[l].y; });
-    z = Pack<Real, W>([&](auto l) { return nodes[l].z; });
+    x = Pack<Real, W>([&](auto l) HEMO_INLINE_LAMBDA { return nodes[l].x; });
+    y = Pack<Real, W>([&](auto l) HEMO_INLINE_LAMBDA { return nodes[l].y; });
+    z = Pack<Real, W>([&](auto l) HEMO_INLINE_LAMBDA { return nodes[l].z; });
   }
 }
 

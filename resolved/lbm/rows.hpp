@@ -26,7 +26,7 @@ HEMO_INLINE void load_populations(const RowPointers<Real>& row, int x, int activ
   constexpr int W = lanes<Real>;
   const N index([](auto l) { return Real(int(l)); });
   const auto mask = index < Real(active);
-  unroll<directions>([&](auto direction) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value;
     if constexpr (whole) {
       f[i] = load<Real, W>(row.p[i] + x);
@@ -42,7 +42,7 @@ HEMO_INLINE void load_populations(const RowPointers<Real>& row, int x, int activ
 template <Wall wall, bool whole, class N>
 HEMO_INLINE void add_outgoing(const N (&f)[directions], int active, double (&sum)[3]) {
   for (int l = 0; l < (whole ? int(N::size()) : active); ++l) {
-    unroll<directions>([&](auto direction) {
+    unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
       constexpr int i = decltype(direction)::value;
       if constexpr (leaves(wall, opposite(i))) {
         for (int a = 0; a < 3; ++a) sum[a] += c[i][a] * static_cast<double>(f[i][l]);
@@ -77,7 +77,7 @@ HEMO_INLINE void collide_pack(const RowPointers<Real>& row, int x, int active, c
   if constexpr (wall != Wall::none) add_outgoing<wall, whole>(f, active, outgoing);
   const N index([](auto l) { return Real(int(l)); });
   const auto mask = index < Real(active);
-  unroll<directions>([&](auto direction) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value, o = opposite(i);
     if constexpr (leaves(wall, o)) f[i] += row.wall_term[o];
     if constexpr (whole) {
