@@ -142,7 +142,9 @@ struct Scene {
   Places place;
 
   std::string source_text;   ///< canonical YAML of this scene (comments and white space gone)
-  std::string input_sha256;  ///< of source_text: equal physics, equal hash
+  std::string input_sha256;  ///< of what decides the results: equal physics, equal hash (checkpoint intervals and
+                             ///< file names do not count, file contents do)
+  std::vector<std::string> warnings;  ///< keys that have no effect, as file:line:col: problem (why) suggestion
 
   const Kind* find_kind(const std::string& name) const {
     for (const auto& k : cells.kinds)
@@ -157,5 +159,8 @@ Scene read_scene(const std::string& path, const std::vector<std::string>& overri
 /// The same from text; \p name stands for the file in messages.
 Scene parse_scene(const std::string& text, const std::string& name,
                   const std::vector<std::string>& overrides = {});
+/// Canonical YAML of \p scene: sorted keys, SI values, all defaults; parse_scene reads the same scene back.
+/// \throws InputError if it is not a valid scene.
+std::string write_scene(const Scene& scene);
 
 }  // namespace hemowalk::data

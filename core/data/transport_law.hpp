@@ -62,6 +62,8 @@ struct TransportLaw {
 
 /// Lossless round trip (17 significant digits). \throws InputError / IoError.
 TransportLaw read_transport_law(const std::string& path);
+/// The same from text; \p name stands for the file in messages.
+TransportLaw parse_transport_law(const std::string& text, const std::string& name);
 void write_transport_law(const TransportLaw& law, const std::string& path);
 
 }  // namespace hemowalk::data
