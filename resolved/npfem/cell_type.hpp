@@ -26,10 +26,8 @@ struct SparseFactor {
 class CellType {
  public:
   /// \p rest valid and centred where the body's frame is; \p metric m_k + k a_k per vertex (the mass of the
-  /// implicit step); \p h the solid time step. \p standin_shear is the paper's stiffness of the Skalak term
-  /// beside C; < 0 chooses 5.5 B (27.5 pN/um for B = 5).
-  CellType(mesh::TriangleMesh rest, Material material, std::vector<double> metric, double h,
-           double standin_shear = -1);
+  /// implicit step); \p h the solid time step. The in-plane stand-in is Material::standin().
+  CellType(mesh::TriangleMesh rest, Material material, std::vector<double> metric, double h);
 
   const mesh::TriangleMesh& rest() const { return rest_; }
   const Material& material() const { return material_; }

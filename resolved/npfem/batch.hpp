@@ -1,0 +1,133 @@
+#pragma once
+/// \file The work on one batch: as many cells as a register has lanes, each in its own lane, no lane looking at
+/// another. Fields are [vertex][component][lane]; the tables are shared by all batches of a type.
+
+#include <vector>
+
+#include "core/array.hpp"
+#include "core/simd.hpp"
+#include "resolved/mesh/lanes.hpp"
+#include "resolved/mesh/step.hpp"
+#include "resolved/npfem/cell_type.hpp"
+#include "resolved/npfem/terms/edge_bending.hpp"
+#include "resolved/npfem/terms/helfrich.hpp"
+#include "resolved/npfem/terms/local_area.hpp"
+#include "resolved/npfem/terms/neo_hookean.hpp"
+#include "resolved/npfem/terms/skalak.hpp"
+#include "resolved/npfem/terms/skalak_hardening.hpp"
+#include "resolved/npfem/terms/volume.hpp"
+
+namespace hemowalk::npfem {
+
+/// The paper's in-plane law: Skalak shear with hardening, plus local area.
+template <class S>
+struct PaperLaw {
+  SkalakHardening<S> shear;
+  LocalArea<S> area;
+  template <class T>
+  HEMO_HD StretchGradient<T> gradient(const Stretch<T>& s) const {
+    return shear.gradient(s) + area.gradient(s);
+  }
+};
+
+/// CellType's tables in the arithmetic of the batch.
+template <class Real>
+struct Tables {
+  struct TriangleRow {
+    int v0, v1, v2;
+    RestTriangle<Real> rest;
+  };
+  struct EdgeRow {
+    int v0, v1, v2, v3;
+    RestEdge<Real> rest;
+  };
+  explicit Tables(const CellType& type);
+
+  int vertices;
+  Material material;
+  std::vector<TriangleRow> triangles;
+  std::vector<EdgeRow> edges;
+  std::vector<Real> metric, mass_rate, kappa;  ///< m, m/h^2, kappa of every vertex
+  std::vector<int> order, row_begin, row_index, column_begin, column_index;  ///< SparseFactor
+  std::vector<Real> row_value, column_value, inverse_diagonal;
+  std::vector<int> lap_begin, lap_index;  ///< full rows of Lap (Rayleigh damping)
+  std::vector<Real> lap_value;
+  Real h, inverse_h, rest_volume, rest_gradient_square, epsilon2, total_metric;
+  bool damped;
+};
+
+/// Scratch fields of one thread; sized once.
+template <class Real>
+struct Scratch {
+  explicit Scratch(int vertices)
+      : moved(3 * size(vertices)), increment(3 * size(vertices)), force(3 * size(vertices)),
+        gradient(3 * size(vertices)), curvature(size(vertices)), area(size(vertices)) {}
+  static std::size_t size(int vertices) { return static_cast<std::size_t>(vertices) * mesh::lanes_of<Real>; }
+  Array<Real> moved, increment, force, gradient, curvature, area;
+};
+
+/// Pointers to the fields of one batch.
+template <class Real>
+struct BatchFields {
+  double* anchor;           ///< [3][lane]
+  Real *offset, *residual;  ///< position = anchor + offset + residual
+  Real *velocity;           ///< that moved the vertices
+  Real *solution;           ///< of the last solve, before damping: the next start guess
+  Real *normal;
+  const Real* predicted;
+};
+
+template <class Real>
+class BatchKernel {
+ public:
+  static constexpr int W = mesh::lanes_of<Real>;
+  using P = Pack<Real, W>;
+  using V = Vector<P>;
+
+  BatchKernel(const Tables<Real>& tables, Scratch<Real>& scratch) : t_(tables), s_(scratch) {}
+
+  /// What one batch reports, per lane.
+  struct Report {
+    P increment, residual;  ///< squares of the ratios of mesh::StepReport
+    P probe;                ///< not finite where any vertex is not
+  };
+  Report step(const BatchFields<Real>& b, const mesh::StepOptions& options);
+  /// F_int at the present positions, into scratch.force.
+  void forces(const BatchFields<Real>& b);
+  void update_normals(const BatchFields<Real>& b);
+
+ private:
+  static V load3(const Real* field, int k) {
+    const Real* p = field + static_cast<std::size_t>(k) * 3 * W;
+    return {load<Real, W>(p), load<Real, W>(p + W), load<Real, W>(p + 2 * W)};
+  }
+  static void store3(const V& v, Real* field, int k) {
+    Real* p = field + static_cast<std::size_t>(k) * 3 * W;
+    store<Real, W>(v.x, p), store<Real, W>(v.y, p + W), store<Real, W>(v.z, p + 2 * W);
+  }
+  static void add3(const V& v, Real* field, int k) { store3(load3(field, k) + v, field, k); }
+
+  /// x_j - x_i, each position being offset + moved: the small parts are subtracted among themselves.
+  V between(const Real* offset, int i, int j) const {
+    return (load3(offset, j) - load3(offset, i)) + (load3(s_.moved.data(), j) - load3(s_.moved.data(), i));
+  }
+  /// All but the volume force into scratch.force. \returns the factor p of the volume force -p sum of area normals.
+  P membrane_forces(const Real* offset);
+  template <class LawType>
+  P stretch_pass(const Real* offset, const LawType& law);
+  void edge_pass(const Real* offset);
+  void helfrich_pass(const Real* offset);
+  /// F_int - m/h^2 (d - h v_pred) into scratch.force. \returns sum of squares of the inertial part, for scale.
+  P unbalance(const BatchFields<Real>& b);
+  void add_rayleigh();
+  void solve();
+  /// d += correction; \returns |correction|^2/|d|^2.
+  P correct(const BatchFields<Real>& b);
+  void damp_and_project(const BatchFields<Real>& b, bool damping);
+  P move(const BatchFields<Real>& b);
+
+  const Tables<Real>& t_;
+  Scratch<Real>& s_;
+};
+
+}  // namespace hemowalk::npfem

@@ -1,0 +1,106 @@
+#pragma once
+/// \file In-plane stretch of a triangle and the nodal forces of an isotropic membrane law.
+///
+/// F = P^T [e1 e2] R is the 2x2 deformation gradient with principal stretches s1, s2. Only the rest metric's
+/// inverse B = R R^T and the metric g_ij = e_i . e_j enter, so no singular value decomposition is needed:
+/// I1 = s1^2 + s2^2 = tr(B g), J = s1 s2 = sqrt(det B det g), t = s1 + s2 = sqrt(I1 + 2 J).
+/// T is float, double or a pack of them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/portability.hpp"
+
+namespace hemowalk::npfem {
+
+template <class T>
+struct Vector {
+  T x, y, z;
+};
+template <class T>
+HEMO_HD inline Vector<T> operator+(const Vector<T>& a, const Vector<T>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class T>
+HEMO_HD inline Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class S, class T>
+HEMO_HD inline Vector<T> operator*(const S& s, const Vector<T>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class T>
+HEMO_HD inline T dot(const Vector<T>& a, const Vector<T>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class T>
+HEMO_HD inline Vector<T> cross(const Vector<T>& a, const Vector<T>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Invariants of the stretches.
+template <class T>
+struct Stretch {
+  T I1, J, t;
+};
+
+/// Derivative of the energy per rest area with respect to I1 and J.
+template <class T>
+struct StretchGradient {
+  T I1, J;
+};
+template <class T>
+HEMO_HD inline StretchGradient<T> operator+(const StretchGradient<T>& a, const StretchGradient<T>& b) {
+  return {a.I1 + b.I1, a.J + b.J};
+}
+/// From derivatives with respect to t and J at fixed t: t^2 = I1 + 2 J.
+template <class T>
+HEMO_HD inline StretchGradient<T> from_trace(const Stretch<T>& s, const T& w_t, const T& w_J) {
+  const T per_t = w_t / s.t;
+  return {0.5f * per_t, w_J + per_t};
+}
+
+/// Rest data of a triangle: B = inverse metric of its edge vectors, its determinant, and the area.
+template <class S>
+struct RestTriangle {
+  S b11, b12, b22, det, area;
+};
+
+/// The triangle as it is now: edge vectors from vertex 0, their metric, and the area normal e1 x e2.
+template <class T>
+struct Triangle {
+  Vector<T> e1, e2, normal;
+  T g11, g12, g22;
+};
+template <class T>
+HEMO_HD inline Triangle<T> make_triangle(const Vector<T>& e1, const Vector<T>& e2) {
+  return {e1, e2, cross(e1, e2), dot(e1, e1), dot(e1, e2), dot(e2, e2)};
+}
+
+template <class S, class T>
+HEMO_HD inline Stretch<T> stretch_of(const RestTriangle<S>& rest, const Triangle<T>& now) {
+  using std::max;
+  using std::sqrt;
+  const T I1 = rest.b11 * now.g11 + 2 * (rest.b12 * now.g12) + rest.b22 * now.g22;
+  // |normal|^2 is det g without cancellation. The floor keeps a collapsed triangle finite.
+  const T J = sqrt(max(rest.det * dot(now.normal, now.normal), T(1e-12f)));
+  return {I1, J, sqrt(I1 + 2 * J)};
+}
+
+/// Forces on vertices 1 and 2; vertex 0 takes minus their sum. K = A (2 w_I1 B + (w_J/J) det B adj g) is
+/// symmetric, so the triangle's own force and torque vanish to round-off.
+template <class S, class T>
+HEMO_HD inline void stretch_forces(const RestTriangle<S>& rest, const Triangle<T>& now, const Stretch<T>& s,
+                                   const StretchGradient<T>& w, Vector<T>& f1, Vector<T>& f2) {
+  const T a = (2 * rest.area) * w.I1;
+  const T b = (rest.area * rest.det) * w.J / s.J;
+  const T k11 = a * rest.b11 + b * now.g22;
+  const T k12 = a * rest.b12 - b * now.g12;
+  const T k22 = a * rest.b22 + b * now.g11;
+  f1 = {-(k11 * now.e1.x + k12 * now.e2.x), -(k11 * now.e1.y + k12 * now.e2.y),
+        -(k11 * now.e1.z + k12 * now.e2.z)};
+  f2 = {-(k12 * now.e1.x + k22 * now.e2.x), -(k12 * now.e1.y + k22 * now.e2.y),
+        -(k12 * now.e1.z + k22 * now.e2.z)};
+}
+
+}  // namespace hemowalk::npfem
