@@ -13,6 +13,9 @@ namespace {
 
 /// Half the difference between single and exact coordinates in the largest boxes, dx; added to search radii.
 constexpr double slack = 1e-3;
+/// Distances in the lists are in single precision; this much is taken off, so that they never exceed the true
+/// ones.
+constexpr double rounding = 1e-5;
 
 std::uint64_t key_of(std::uint32_t target, const std::array<std::int32_t, 3>& wraps) {
   std::uint64_t key = target;
@@ -139,10 +142,12 @@ void Neighbours<Real>::pair_bodies(const Cloud<Real>& cloud) {
         watched_.push_back({a, b});
       }
     });
-  for (std::uint32_t a = 0; a < bodies; ++a)  // a body may meet its own image
+  meets_itself_.assign(bodies, 0);
+  for (std::uint32_t a = 0; a < bodies; ++a)
     for (int k = 0; k < 3; ++k)
       if (domain_.period[k] > 0 && domain_.period[k] - 2 * half_[a][k] < limit) {
         watched_.push_back({a, a});
+        meets_itself_[a] = true;
         break;
       }
 }
@@ -158,7 +163,7 @@ void Neighbours<Real>::sort_triangles(const Cloud<Real>& cloud) {
   slots_.resize(count);
   radius_.resize(count);
   constexpr std::size_t pad = 16;  // lets packs read past the end
-  for (auto* a : {&cx_, &cy_, &cz_, &cr_}) a->resize(count + pad);
+  for (auto* a : {&cx_, &cy_, &cz_, &cr_, &cmark_}) a->resize(count + pad);
   cbody_.resize(count + pad);
   ctriangle_.resize(count + pad);
   cwraps_.resize(count + pad);
@@ -223,6 +228,7 @@ void Neighbours<Real>::sort_triangles(const Cloud<Real>& cloud) {
     cx_[s] = boxed[0], cy_[s] = boxed[1], cz_[s] = boxed[2];
     cr_[s] = radius_[i];
     cbody_[s] = b;
+    cmark_[s] = static_cast<float>(b);
     ctriangle_[s] = t;
   }
 }
@@ -234,6 +240,15 @@ Point<Real> Neighbours<Real>::shift(const Cloud<Real>& cloud, std::uint32_t from
   for (int k = 0; k < 3; ++k)
     s[k] = static_cast<Real>(cloud.origin[to][k] - cloud.origin[from][k] + wraps[k] * domain_.period[k]);
   return {s[0], s[1], s[2]};
+}
+
+/// Keys name images relative to where the bodies' centres fell in the box; this is what the caller's
+/// coordinates need.
+template <class Real>
+std::array<std::int32_t, 3> Neighbours<Real>::absolute(std::uint32_t from, std::uint64_t key) const {
+  std::array<std::int32_t, 3> wraps = wraps_of(key);
+  for (int k = 0; k < 3; ++k) wraps[k] += body_slots_[from].wraps[k] - body_slots_[target_of(key)].wraps[k];
+  return wraps;
 }
 
 template <class Real>
@@ -257,11 +272,13 @@ template <class Real>
 void Neighbours<Real>::find_triangles(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex,
                                       Scratch& scratch) {
   scratch.hits.clear();
+  for (auto& c : scratch.corner) c.clear();
   const Point<Real> p = cloud.x[cloud.first[body] + vertex];
   std::array<double, 3> at{cloud.origin[body][0] + double(p.x), cloud.origin[body][1] + double(p.y),
                            cloud.origin[body][2] + double(p.z)};
   const Slot slot = grid_.locate(at);
   const bool owned = cloud.bodies[body].owned;
+  const float mine = meets_itself_[body] ? -1.0f : static_cast<float>(body);
   using P = Pack<float, 16>;
   grid_.around(slot.cell, [&](std::uint32_t begin, std::uint32_t end,
                               const std::array<std::int32_t, 3>& wraps) {
@@ -270,10 +287,12 @@ void Neighbours<Real>::find_triangles(const Cloud<Real>& cloud, std::uint32_t bo
     for (std::uint32_t i = begin; i < end; i += 16) {
       const P dx = load<float, 16>(&cx_[i]) - o[0], dy = load<float, 16>(&cy_[i]) - o[1],
               dz = load<float, 16>(&cz_[i]) - o[2], r = load<float, 16>(&cr_[i]);
-      const auto close = dx * dx + dy * dy + dz * dz < r * r;
-      if (stdx::none_of(close)) continue;
-      for (std::uint32_t j = i; j < std::min(i + 16, end); ++j) {
-        if (!close[j - i]) continue;
+      auto close = dx * dx + dy * dy + dz * dz < r * r && load<float, 16>(&cmark_[i]) != mine;
+      while (stdx::any_of(close)) {
+        const auto lane = static_cast<std::uint32_t>(stdx::find_first_set(close));
+        close[lane] = false;
+        const std::uint32_t j = i + lane;
+        if (j >= end) break;
         const std::uint32_t other = cbody_[j];
         std::array<std::int32_t, 3> image;  // of the other body, seen from this one
         bool same = other == body;
@@ -284,25 +303,53 @@ void Neighbours<Real>::find_triangles(const Cloud<Real>& cloud, std::uint32_t bo
           same = same && boxes == 0;
         }
         if (same || (!owned && !cloud.bodies[other].owned)) continue;
-        std::array<std::int32_t, 3> absolute;
-        for (int k = 0; k < 3; ++k)
-          absolute[k] = image[k] + body_slots_[body].wraps[k] - body_slots_[other].wraps[k];
-        const Point<Real> q = p - shift(cloud, body, other, absolute);
+        const std::uint64_t key = key_of(other, image);
+        const Point<Real> q = p - shift(cloud, body, other, absolute(body, key));
         const Point<Real>* x = cloud.x.data() + cloud.first[other];
         const Corners& c = shapes_[cloud.bodies[other].shape].triangles[ctriangle_[j]];
-        const auto nearest = nearest_on_triangle(q, x[c[0]], x[c[1]], x[c[2]]);
-        const Real distance = std::sqrt(nearest.squared);
-        if (distance > reach_ + skin_) continue;
-        scratch.hits.push_back({key_of(other, image), ctriangle_[j], static_cast<float>(distance), nearest.wb,
-                                nearest.wc, nearest.to_point});
+        scratch.hits.push_back({key, ctriangle_[j], 0});
+        for (int k = 0; k < 3; ++k) {
+          const Point<Real> r = x[c[k]] - q;
+          scratch.corner[3 * k].push_back(static_cast<float>(r.x));
+          scratch.corner[3 * k + 1].push_back(static_cast<float>(r.y));
+          scratch.corner[3 * k + 2].push_back(static_cast<float>(r.z));
+        }
       }
     }
   });
+  measure_hits(scratch);
+}
+
+/// Exact distances for the hits, 16 at a time; those out of reach are dropped.
+template <class Real>
+void Neighbours<Real>::measure_hits(Scratch& scratch) {
+  using P = Pack<float, 16>;
+  auto& hits = scratch.hits;
+  const std::size_t count = hits.size(), padded = (count + 15) / 16 * 16;
+  for (auto& c : scratch.corner) c.resize(padded);
+  const auto limit = static_cast<float>(reach_ + skin_);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count; i += 16) {
+    Point<P> x[3];
+    for (int k = 0; k < 3; ++k)
+      x[k] = {load<float, 16>(&scratch.corner[3 * k][i]), load<float, 16>(&scratch.corner[3 * k + 1][i]),
+              load<float, 16>(&scratch.corner[3 * k + 2][i])};
+    alignas(64) float distance[16];
+    const P zero(0);
+    store<float, 16>(stdx::sqrt(nearest_on_triangle(Point<P>{zero, zero, zero}, x[0], x[1], x[2]).squared),
+                     distance);
+    for (std::size_t j = i; j < std::min(i + 16, count); ++j) {
+      hits[kept] = hits[j];
+      hits[kept].distance = distance[j - i] - static_cast<float>(rounding);
+      kept += distance[j - i] <= limit;
+    }
+  }
+  hits.resize(kept);
 }
 
 /// Turns the hits of one vertex into one entry per body it is near to.
 template <class Real>
-void Neighbours<Real>::take_entries(const Cloud<Real>& cloud, std::uint32_t, std::uint32_t vertex,
+void Neighbours<Real>::take_entries(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex,
                                     Scratch& scratch) {
   auto& hits = scratch.hits;
   std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
@@ -314,10 +361,13 @@ void Neighbours<Real>::take_entries(const Cloud<Real>& cloud, std::uint32_t, std
     std::size_t end = i + 1;
     while (end < hits.size() && hits[end].key == best.key) ++end;
     const std::uint32_t target = target_of(best.key);
-    const Point<Real> n =
-        pseudo_normal(shapes_[cloud.bodies[target].shape], cloud.x.data() + cloud.first[target],
-                      best.triangle, best.wb, best.wc);
-    const bool outside = dot(best.to_point, n) >= 0;
+    const Topology& shape = shapes_[cloud.bodies[target].shape];
+    const Point<Real>* x = cloud.x.data() + cloud.first[target];
+    const Corners& c = shape.triangles[best.triangle];
+    const Point<Real> p =
+        cloud.x[cloud.first[body] + vertex] - shift(cloud, body, target, absolute(body, best.key));
+    const auto q = nearest_on_triangle(p, x[c[0]], x[c[1]], x[c[2]]);
+    const bool outside = dot(q.to_point, pseudo_normal(shape, x, best.triangle, q.wb, q.wc)) >= 0;
     if (best.distance <= (outside ? law_.range : law_.depth) + skin_) {
       // A triangle farther by two skins cannot become the nearest before the next search.
       std::size_t last = i;
@@ -344,10 +394,7 @@ void Neighbours<Real>::link_up(std::uint32_t body, Scratch& scratch) {
     const auto at = static_cast<std::uint32_t>(near.entries.size());
     if (near.links.empty() || scratch.link_key != f.key) {
       scratch.link_key = f.key;
-      const std::uint32_t target = target_of(f.key);
-      std::array<std::int32_t, 3> wraps = wraps_of(f.key);
-      for (int k = 0; k < 3; ++k) wraps[k] += body_slots_[body].wraps[k] - body_slots_[target].wraps[k];
-      near.links.push_back({target, wraps, at, at, 0, 0});
+      near.links.push_back({target_of(f.key), absolute(body, f.key), at, at, 0, 0});
     }
     Entry entry = f.entry;
     entry.candidates = static_cast<std::uint32_t>(near.candidates.size());

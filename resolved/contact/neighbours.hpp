@@ -110,8 +110,6 @@ class Neighbours {
     std::uint64_t key;  ///< target and image
     std::uint32_t triangle;
     float distance;
-    Real wb, wc;
-    Point<Real> to_point;
   };
   struct Found {
     std::uint64_t key;
@@ -119,6 +117,7 @@ class Neighbours {
   };
   struct Scratch {  ///< of one thread
     std::vector<Hit> hits;
+    std::array<std::vector<float>, 9> corner;  ///< of the hits' triangles, relative to the vertex
     std::vector<Found> found;
     std::vector<Candidate> candidates;
     std::uint64_t link_key = 0;
@@ -130,6 +129,8 @@ class Neighbours {
   void pair_bodies(const Cloud<Real>& cloud);
   void look_around(const Cloud<Real>& cloud, std::uint32_t body, Scratch& scratch);
   void find_triangles(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex, Scratch& scratch);
+  void measure_hits(Scratch& scratch);
+  std::array<std::int32_t, 3> absolute(std::uint32_t from, std::uint64_t key) const;
   void take_entries(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex, Scratch& scratch);
   void link_up(std::uint32_t body, Scratch& scratch);
   void collect_incoming(std::size_t bodies);
@@ -155,8 +156,10 @@ class Neighbours {
   std::vector<float> radius_;                         ///< of triangles about their centroid, before sorting
   std::vector<std::array<double, 3>> centre_, half_;  ///< of the bodies' bounding boxes
   std::vector<std::uint32_t> seen_;
+  std::vector<std::uint8_t> meets_itself_;  ///< [bodies] its own image is near
   /// Triangles in cell order: centroid in the box, radius of the search sphere, body, number, wraps.
   std::vector<float> cx_, cy_, cz_, cr_;
+  std::vector<float> cmark_;  ///< the body again, as a number that packs compare (exact below 2^24 bodies)
   std::vector<std::uint32_t> cbody_, ctriangle_;
   std::vector<std::array<std::int8_t, 4>> cwraps_;
   std::vector<Scratch> scratch_;
