@@ -7,6 +7,9 @@
 namespace hemowalk::npfem {
 namespace {
 
+// [[gnu::flatten]]: GCC's inliner gives up on packs half-way and then calls a function per arithmetic
+// operation.
+
 /// Partial sums of this many terms keep the round-off of a single precision sum small.
 constexpr int chunk = 16;
 
@@ -53,8 +56,11 @@ Tables<Real>::Tables(const CellType& type)
   for (int t = 0; t < type.rest().triangle_count(); ++t) {
     const auto& v = type.rest().triangles[t];
     const auto& r = type.triangle_rest()[t];
-    triangles.push_back({v[0], v[1], v[2],
-                         {real(r.b11), real(r.b12), real(r.b22), real(r.b11 * r.b22 - r.b12 * r.b12), real(r.area)}});
+    triangles.push_back(
+        {v[0],
+         v[1],
+         v[2],
+         {real(r.b11), real(r.b12), real(r.b22), real(r.b11 * r.b22 - r.b12 * r.b12), real(r.area)}});
   }
   for (std::size_t e = 0; e < type.edges().size(); ++e) {
     const auto& v = type.edges()[e];
@@ -76,7 +82,8 @@ Tables<Real>::Tables(const CellType& type)
 
 template <class Real>
 template <class LawType>
-auto BatchKernel<Real>::stretch_pass(const Real* offset, const LawType& law) -> P {
+[[gnu::flatten, gnu::noinline]] auto BatchKernel<Real>::stretch_pass(const Real* offset, const LawType& law)
+    -> P {
   Real *force = s_.force.data(), *gradient = s_.gradient.data();
   const Real* moved = s_.moved.data();
   P volume(0);
@@ -105,7 +112,7 @@ auto BatchKernel<Real>::stretch_pass(const Real* offset, const LawType& law) -> 
 }
 
 template <class Real>
-void BatchKernel<Real>::edge_pass(const Real* offset) {
+[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::edge_pass(const Real* offset) {
   Real* force = s_.force.data();
   const Real* moved = s_.moved.data();
   for (const auto& row : t_.edges) {
@@ -122,7 +129,7 @@ void BatchKernel<Real>::edge_pass(const Real* offset) {
 }
 
 template <class Real>
-void BatchKernel<Real>::helfrich_pass(const Real* offset) {
+[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::helfrich_pass(const Real* offset) {
   const Real modulus = static_cast<Real>(t_.material.bending_modulus);
   const Real h0 = static_cast<Real>(t_.material.reference_curvature);
   Real *force = s_.force.data(), *curvature = s_.curvature.data(), *area = s_.area.data();
@@ -132,7 +139,9 @@ void BatchKernel<Real>::helfrich_pass(const Real* offset) {
     Real* p = field + static_cast<std::size_t>(k) * W;
     store<Real, W>(load<Real, W>(p) + value, p);
   };
-  const auto at = [](const Real* field, int k) { return load<Real, W>(field + static_cast<std::size_t>(k) * W); };
+  const auto at = [](const Real* field, int k) {
+    return load<Real, W>(field + static_cast<std::size_t>(k) * W);
+  };
   using std::sqrt;
   for (const auto& row : t_.triangles) {
     const V n = cross(between(offset, row.v0, row.v1), between(offset, row.v0, row.v2));
@@ -140,7 +149,8 @@ void BatchKernel<Real>::helfrich_pass(const Real* offset) {
     for (int v : {row.v0, row.v1, row.v2}) add(third, area, v);
   }
   const auto hinge = [&](const auto& row) {
-    return dihedral(between(offset, row.v0, row.v1), between(offset, row.v0, row.v2), between(offset, row.v0, row.v3));
+    return dihedral(between(offset, row.v0, row.v1), between(offset, row.v0, row.v2),
+                    between(offset, row.v0, row.v3));
   };
   for (const auto& row : t_.edges) {
     const auto d = hinge(row);
@@ -165,7 +175,8 @@ void BatchKernel<Real>::helfrich_pass(const Real* offset) {
   }
   for (const auto& row : t_.triangles) {
     const V e1 = between(offset, row.v0, row.v1), e2 = between(offset, row.v0, row.v2), n = cross(e1, e2);
-    const P w = (at(area, row.v0) + at(area, row.v1) + at(area, row.v2)) * (Real(-1) / Real(6)) / sqrt(dot(n, n));
+    const P w =
+        (at(area, row.v0) + at(area, row.v1) + at(area, row.v2)) * (Real(-1) / Real(6)) / sqrt(dot(n, n));
     const V f1 = w * cross(e2, n), f2 = w * cross(n, e1);
     add3(f1, force, row.v1);
     add3(f2, force, row.v2);
@@ -174,16 +185,22 @@ void BatchKernel<Real>::helfrich_pass(const Real* offset) {
 }
 
 template <class Real>
-auto BatchKernel<Real>::membrane_forces(const Real* offset) -> P {
+[[gnu::flatten]] auto BatchKernel<Real>::membrane_forces(const Real* offset) -> P {
   std::memset(s_.force.data(), 0, sizeof(Real) * s_.force.size());
   std::memset(s_.gradient.data(), 0, sizeof(Real) * s_.gradient.size());
   const auto& m = t_.material;
   const auto real = [](double x) { return static_cast<Real>(x); };
   P volume(0);
   switch (m.law) {
-    case Law::paper: volume = stretch_pass(offset, PaperLaw<Real>{{real(m.B), real(m.D)}, {real(m.C)}}); break;
-    case Law::neo_hookean: volume = stretch_pass(offset, NeoHookean<Real>{real(m.Gs)}); break;
-    case Law::skalak: volume = stretch_pass(offset, Skalak<Real>{real(m.Gs), real(m.skalak_C)}); break;
+    case Law::paper:
+      volume = stretch_pass(offset, PaperLaw<Real>{{real(m.B), real(m.D)}, {real(m.C)}});
+      break;
+    case Law::neo_hookean:
+      volume = stretch_pass(offset, NeoHookean<Real>{real(m.Gs)});
+      break;
+    case Law::skalak:
+      volume = stretch_pass(offset, Skalak<Real>{real(m.Gs), real(m.skalak_C)});
+      break;
   }
   if (m.bending == Bending::paper) edge_pass(offset);
   if (m.bending == Bending::helfrich) helfrich_pass(offset);
@@ -207,12 +224,11 @@ void BatchKernel<Real>::forces(const BatchFields<Real>& b) {
 }
 
 template <class Real>
-auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b) -> P {
+[[gnu::flatten]] auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b) -> P {
   const P p = membrane_forces(b.offset);
   P square(0);
   for (int k = 0; k < t_.vertices; ++k) {
-    const V inertia =
-        t_.mass_rate[k] * (t_.h * load3(b.predicted, k) - load3(s_.increment.data(), k));
+    const V inertia = t_.mass_rate[k] * (t_.h * load3(b.predicted, k) - load3(s_.increment.data(), k));
     square += dot(inertia, inertia);
     add3(inertia - p * load3(s_.gradient.data(), k), s_.force.data(), k);
   }
@@ -222,7 +238,7 @@ auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b) -> P {
 
 /// - beta Lap v, v = d/h.
 template <class Real>
-void BatchKernel<Real>::add_rayleigh() {
+[[gnu::flatten]] void BatchKernel<Real>::add_rayleigh() {
   const Real factor = static_cast<Real>(-t_.material.rayleigh_beta) * t_.inverse_h;
   for (int k = 0; k < t_.vertices; ++k) {
     V sum{P(0), P(0), P(0)};
@@ -232,9 +248,10 @@ void BatchKernel<Real>::add_rayleigh() {
   }
 }
 
-/// scratch.force <- N^{-1} scratch.force by two triangular sweeps, the three components and all lanes at once.
+/// scratch.force <- N^{-1} scratch.force by two triangular sweeps, the three components and all lanes at
+/// once.
 template <class Real>
-void BatchKernel<Real>::solve() {
+[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::solve() {
   Real* x = s_.force.data();
   const int n = t_.vertices;
   for (int p = 0; p < n; ++p) {
@@ -252,7 +269,7 @@ void BatchKernel<Real>::solve() {
 }
 
 template <class Real>
-auto BatchKernel<Real>::correct(const BatchFields<Real>& b) -> P {
+[[gnu::flatten]] auto BatchKernel<Real>::correct(const BatchFields<Real>& b) -> P {
   P change(0), total(0);
   for (int k = 0; k < t_.vertices; ++k) {
     const V y = load3(s_.force.data(), k), d = load3(s_.increment.data(), k) + y;
@@ -265,10 +282,11 @@ auto BatchKernel<Real>::correct(const BatchFields<Real>& b) -> P {
   return change / max(total, P(Real(1e-30)));
 }
 
-/// v from d/h: kappa damping of the part that is no rigid motion, then the rigid motion that gives the body exactly
-/// the linear and angular momentum (about x^n) of v_pred: internal forces change neither, converged or not.
+/// v from d/h: kappa damping of the part that is no rigid motion, then the rigid motion that gives the body
+/// exactly the linear and angular momentum (about x^n) of v_pred: internal forces change neither, converged
+/// or not.
 template <class Real>
-void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool damping) {
+[[gnu::flatten]] void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool damping) {
   Inertia<P> inertia;
   Momentum<P> wanted, solved;
   for_chunks(t_.vertices, [&](int begin, int end) {
@@ -298,7 +316,8 @@ void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool dampin
     }
     left.add(part);
   });
-  const Momentum<P> rigid{wanted.linear - left.linear, (wanted.angular - cross(c, wanted.linear)) - left.angular};
+  const Momentum<P> rigid{wanted.linear - left.linear,
+                          (wanted.angular - cross(c, wanted.linear)) - left.angular};
   const auto after = body.motion_about_centre(rigid);
   for (int k = 0; k < t_.vertices; ++k)
     add3(after.velocity + cross(after.spin, load3(b.offset, k) - c), b.velocity, k);
@@ -307,7 +326,7 @@ void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool dampin
 /// x += h v. The mean goes into the double anchor, the rest into offset + residual without loss.
 /// \returns a number per lane that is finite if all of it was.
 template <class Real>
-auto BatchKernel<Real>::move(const BatchFields<Real>& b) -> P {
+[[gnu::flatten]] auto BatchKernel<Real>::move(const BatchFields<Real>& b) -> P {
   V mean{P(0), P(0), P(0)};
   for_chunks(t_.vertices, [&](int begin, int end) {
     V part{P(0), P(0), P(0)};
@@ -317,7 +336,8 @@ auto BatchKernel<Real>::move(const BatchFields<Real>& b) -> P {
   mean = (t_.h / static_cast<Real>(t_.vertices)) * mean;
   const P* component[3] = {&mean.x, &mean.y, &mean.z};
   for (int d = 0; d < 3; ++d)
-    for (int lane = 0; lane < W; ++lane) b.anchor[d * W + lane] += static_cast<double>(Real((*component[d])[lane]));
+    for (int lane = 0; lane < W; ++lane)
+      b.anchor[d * W + lane] += static_cast<double>(Real((*component[d])[lane]));
   const auto two_sum = [](const P& x, const P& y, P& error) {
     const P sum = x + y, part = sum - x;
     error = (x - (sum - part)) + (y - part);
@@ -337,7 +357,7 @@ auto BatchKernel<Real>::move(const BatchFields<Real>& b) -> P {
 }
 
 template <class Real>
-void BatchKernel<Real>::update_normals(const BatchFields<Real>& b) {
+[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::update_normals(const BatchFields<Real>& b) {
   std::memset(b.normal, 0, sizeof(Real) * 3 * Scratch<Real>::size(t_.vertices));
   for (const auto& row : t_.triangles) {
     const V r0 = load3(b.offset, row.v0);
@@ -354,8 +374,8 @@ void BatchKernel<Real>::update_normals(const BatchFields<Real>& b) {
 
 template <class Real>
 auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions& options) -> Report {
-  // Start where the last step's solution points: what is wrong with the stand-in then acts on dv/dt only. Starting
-  // from v_pred instead would let the stand-in resist the motion itself.
+  // Start where the last step's solution points: what is wrong with the stand-in then acts on dv/dt only.
+  // Starting from v_pred instead would let the stand-in resist the motion itself.
   for (int k = 0; k < t_.vertices; ++k) {
     const V d = t_.h * load3(b.solution, k);
     store3(d, s_.increment.data(), k);

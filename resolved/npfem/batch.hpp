@@ -1,6 +1,6 @@
 #pragma once
-/// \file The work on one batch: as many cells as a register has lanes, each in its own lane, no lane looking at
-/// another. Fields are [vertex][component][lane]; the tables are shared by all batches of a type.
+/// \file The work on one batch: as many cells as a register has lanes, each in its own lane, no lane looking
+/// at another. Fields are [vertex][component][lane]; the tables are shared by all batches of a type.
 
 #include <vector>
 
@@ -60,8 +60,12 @@ struct Tables {
 template <class Real>
 struct Scratch {
   explicit Scratch(int vertices)
-      : moved(3 * size(vertices)), increment(3 * size(vertices)), force(3 * size(vertices)),
-        gradient(3 * size(vertices)), curvature(size(vertices)), area(size(vertices)) {}
+      : moved(3 * size(vertices)),
+        increment(3 * size(vertices)),
+        force(3 * size(vertices)),
+        gradient(3 * size(vertices)),
+        curvature(size(vertices)),
+        area(size(vertices)) {}
   static std::size_t size(int vertices) { return static_cast<std::size_t>(vertices) * mesh::lanes_of<Real>; }
   Array<Real> moved, increment, force, gradient, curvature, area;
 };
@@ -71,9 +75,9 @@ template <class Real>
 struct BatchFields {
   double* anchor;           ///< [3][lane]
   Real *offset, *residual;  ///< position = anchor + offset + residual
-  Real *velocity;           ///< that moved the vertices
-  Real *solution;           ///< of the last solve, before damping: the next start guess
-  Real *normal;
+  Real* velocity;           ///< that moved the vertices
+  Real* solution;           ///< of the last solve, before damping: the next start guess
+  Real* normal;
   const Real* predicted;
 };
 
@@ -111,13 +115,15 @@ class BatchKernel {
   V between(const Real* offset, int i, int j) const {
     return (load3(offset, j) - load3(offset, i)) + (load3(s_.moved.data(), j) - load3(s_.moved.data(), i));
   }
-  /// All but the volume force into scratch.force. \returns the factor p of the volume force -p sum of area normals.
+  /// All but the volume force into scratch.force. \returns the factor p of the volume force -p sum of area
+  /// normals.
   P membrane_forces(const Real* offset);
   template <class LawType>
   P stretch_pass(const Real* offset, const LawType& law);
   void edge_pass(const Real* offset);
   void helfrich_pass(const Real* offset);
-  /// F_int - m/h^2 (d - h v_pred) into scratch.force. \returns sum of squares of the inertial part, for scale.
+  /// F_int - m/h^2 (d - h v_pred) into scratch.force. \returns sum of squares of the inertial part, for
+  /// scale.
   P unbalance(const BatchFields<Real>& b);
   void add_rayleigh();
   void solve();

@@ -19,8 +19,10 @@ using mesh::norm;
 using mesh::subtract;
 
 CellType::TriangleRest rest_of(const mesh::TriangleMesh& m, const std::array<int, 3>& t) {
-  const auto e1 = subtract(m.vertices[t[1]], m.vertices[t[0]]), e2 = subtract(m.vertices[t[2]], m.vertices[t[0]]);
-  const double g11 = dot(e1, e1), g12 = dot(e1, e2), g22 = dot(e2, e2), det = dot(cross(e1, e2), cross(e1, e2));
+  const auto e1 = subtract(m.vertices[t[1]], m.vertices[t[0]]),
+             e2 = subtract(m.vertices[t[2]], m.vertices[t[0]]);
+  const double g11 = dot(e1, e1), g12 = dot(e1, e2), g22 = dot(e2, e2),
+               det = dot(cross(e1, e2), cross(e1, e2));
   return {g22 / det, -g12 / det, g11 / det, std::sqrt(det) / 2};
 }
 
@@ -36,7 +38,8 @@ CellType::EdgeRest rest_of(const mesh::TriangleMesh& m, const mesh::Edge& e, dou
   const double a0 = triangle_area(e.v2), a1 = triangle_area(e.v3);
   const double cot02 = (l01 - l02 + l12) / (4 * a0), cot12 = (l01 + l02 - l12) / (4 * a0);
   const double cot03 = (l01 - l03 + l13) / (4 * a1), cot13 = (l01 + l03 - l13) / (4 * a1);
-  CellType::EdgeRest r{cot02 + cot03, cot12 + cot13, -(cot02 + cot12), -(cot03 + cot13), 3 * modulus / (a0 + a1), 0};
+  CellType::EdgeRest r{cot02 + cot03,    cot12 + cot13,           -(cot02 + cot12),
+                       -(cot03 + cot13), 3 * modulus / (a0 + a1), 0};
   mesh::Vec3 vector{};
   for (auto [k, w] : {std::pair{e.v0, r.w0}, {e.v1, r.w1}, {e.v2, r.w2}, {e.v3, r.w3}})
     mesh::accumulate(vector, w, x[k]);
@@ -55,6 +58,9 @@ class Accumulator {
     for (auto [i, a] : w)
       for (auto [j, b] : w) add(i, j, scale * a * b);
   }
+  void add(const Accumulator& other) {
+    for (const auto& [at, value] : other.entries_) entries_[at] += value;
+  }
   std::vector<CellType::Entry> entries() const {
     std::vector<CellType::Entry> list;
     for (const auto& [at, value] : entries_) list.push_back({at.first, at.second, value});
@@ -66,9 +72,12 @@ class Accumulator {
 };
 
 /// In-plane stand-in: Hessian of stiffness A/2 |[e1 e2] R|^2 per coordinate.
-void add_stretch(Accumulator& lap, const std::array<int, 3>& t, const CellType::TriangleRest& r, double stiffness) {
-  const double k11 = stiffness * r.area * r.b11, k12 = stiffness * r.area * r.b12, k22 = stiffness * r.area * r.b22;
-  const double k[3][3] = {{k11 + 2 * k12 + k22, -k11 - k12, -k12 - k22}, {-k11 - k12, k11, k12}, {-k12 - k22, k12, k22}};
+void add_stretch(Accumulator& lap, const std::array<int, 3>& t, const CellType::TriangleRest& r,
+                 double stiffness) {
+  const double k11 = stiffness * r.area * r.b11, k12 = stiffness * r.area * r.b12,
+               k22 = stiffness * r.area * r.b22;
+  const double k[3][3] = {
+      {k11 + 2 * k12 + k22, -k11 - k12, -k12 - k22}, {-k11 - k12, k11, k12}, {-k12 - k22, k12, k22}};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) lap.add(t[i], t[j], k[i][j]);
 }
@@ -77,13 +86,14 @@ std::map<int, double> edge_weights(const mesh::Edge& e, const CellType::EdgeRest
   return {{e.v0, r.w0}, {e.v1, r.w1}, {e.v2, r.w2}, {e.v3, r.w3}};
 }
 
-/// Bending stand-in. paper: the edge energy's own bound. helfrich: 4 k_b/A_i m_i m_i^T with m_i = 1/4 sum of the
-/// edge weights around vertex i, the linearised integrated mean curvature.
+/// Bending stand-in. paper: the edge energy's own bound. helfrich: 4 k_b/A_i m_i m_i^T with m_i = 1/4 sum of
+/// the edge weights around vertex i, the linearised integrated mean curvature.
 void add_bending(Accumulator& lap, const CellType& type) {
   const auto& edges = type.edges();
   const auto& rest = type.edge_rest();
   if (type.material().bending == Bending::paper)
-    for (std::size_t i = 0; i < edges.size(); ++i) lap.add_square(edge_weights(edges[i], rest[i]), rest[i].stiffness);
+    for (std::size_t i = 0; i < edges.size(); ++i)
+      lap.add_square(edge_weights(edges[i], rest[i]), rest[i].stiffness);
   if (type.material().bending != Bending::helfrich) return;
   std::vector<std::map<int, double>> curvature(type.rest().vertex_count());
   for (std::size_t i = 0; i < edges.size(); ++i)
@@ -91,6 +101,23 @@ void add_bending(Accumulator& lap, const CellType& type) {
       for (auto [k, w] : edge_weights(edges[i], rest[i])) curvature[end][k] += w / 4;
   for (int k = 0; k < type.rest().vertex_count(); ++k)
     lap.add_square(curvature[k], 4 * type.material().bending_modulus / type.vertex_areas()[k]);
+}
+
+/// Whether the bending stand-in is worth its fill-in (its stencil is twice as wide, the factor four times as
+/// long): only if it can be felt beside mass and in-plane stand-in, by the largest row sum over the diagonal.
+bool matters(const std::vector<CellType::Entry>& bending, const std::vector<CellType::Entry>& stretch,
+             const std::vector<double>& metric, double h) {
+  std::vector<double> row(metric.size(), 0.0), diagonal(metric.size());
+  for (std::size_t k = 0; k < metric.size(); ++k) diagonal[k] = metric[k] / (h * h);
+  for (const auto& e : stretch)
+    if (e.row == e.column) diagonal[e.row] += e.value;
+  for (const auto& e : bending) {
+    row[e.row] += std::abs(e.value);
+    if (e.row != e.column) row[e.column] += std::abs(e.value);
+  }
+  for (std::size_t k = 0; k < metric.size(); ++k)
+    if (row[k] > 0.1 * diagonal[k]) return true;
+  return false;
 }
 
 SparseFactor factorise(int n, const std::vector<CellType::Entry>& entries) {
@@ -101,7 +128,8 @@ SparseFactor factorise(int n, const std::vector<CellType::Entry>& entries) {
   lower.setFromTriplets(triplets.begin(), triplets.end());
   Eigen::SimplicialLDLT<Matrix, Eigen::Lower> ldlt(lower);  // AMD ordering
   require(ldlt.info() == Eigen::Success && (ldlt.vectorD().array() > 0).all(),
-          "matrix of the solid solver is not positive definite (masses or moduli of a cell type are not positive) "
+          "matrix of the solid solver is not positive definite (masses or moduli of a cell type are not "
+          "positive) "
           "check its metric, moduli and mesh");
   SparseFactor f;
   f.order.resize(n);
@@ -134,7 +162,8 @@ CellType::CellType(mesh::TriangleMesh rest, Material material, std::vector<doubl
   require(static_cast<int>(metric_.size()) == n, "metric needs one mass per vertex (" + std::to_string(n) +
                                                      " vertices, " + std::to_string(metric_.size()) +
                                                      " masses) pass m_k + k a_k for every vertex");
-  for (double m : metric_) require(m > 0, "metric must be positive (m_k + k a_k) give the vertices mass or coupling");
+  for (double m : metric_)
+    require(m > 0, "metric must be positive (m_k + k a_k) give the vertices mass or coupling");
   edges_ = mesh::edges(rest_);
   vertex_areas_ = mesh::vertex_areas(rest_);
   rest_area_ = mesh::area(rest_);
@@ -155,7 +184,9 @@ CellType::CellType(mesh::TriangleMesh rest, Material material, std::vector<doubl
   for (const auto& g : gradient) rest_gradient_square_ += dot(g, g);
   for (const auto& e : edges_)
     edge_rest_.push_back(rest_of(rest_, e, material_.bending_modulus, bending_epsilon_));
-  add_bending(lap, *this);
+  Accumulator bending;
+  add_bending(bending, *this);
+  if (matters(bending.entries(), lap.entries(), metric_, h_)) lap.add(bending);
   laplacian_ = lap.entries();
 
   const double stiffness_scale = 1 + material_.rayleigh_beta / h_;

@@ -4,18 +4,24 @@ namespace hemowalk::npfem {
 
 double Material::area_modulus() const {
   switch (law) {
-    case Law::paper: return C / 2 + B / 4;  // w = C/2 |F - F*|^2 + .. = (C/4 + B/8) (dA/A)^2 at small strain
-    case Law::neo_hookean: return 3 * Gs;
-    case Law::skalak: return Gs * (1 + 2 * skalak_C);
+    case Law::paper:
+      return C / 2 + B / 4;  // w = C/2 |F - F*|^2 + .. = (C/4 + B/8) (dA/A)^2 at small strain
+    case Law::neo_hookean:
+      return 3 * Gs;
+    case Law::skalak:
+      return Gs * (1 + 2 * skalak_C);
   }
   return 0;
 }
 
 double Material::standin() const {
   switch (law) {
-    case Law::paper: return 5.5 * B + C;
-    case Law::neo_hookean: return 6 * Gs;
-    case Law::skalak: return 2 * Gs * (1 + 2 * skalak_C);
+    case Law::paper:
+      return 5.5 * B + C;
+    case Law::neo_hookean:
+      return 6 * Gs;
+    case Law::skalak:
+      return 2 * Gs * (1 + 2 * skalak_C);
   }
   return 0;
 }

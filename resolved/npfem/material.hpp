@@ -29,9 +29,10 @@ struct Material {
   double shear_modulus() const { return law == Law::paper ? B / 4 : Gs; }
   /// Small-strain area dilation modulus.
   double area_modulus() const;
-  /// Stiffness of the constant stand-in for the in-plane Hessian (method 3): 5.5 B + C (27.5 + 5000 pN/um) for the
-  /// paper's law, else the largest eigenvalue of the rest tangent in the stretches: 6 Gs (neo-Hookean),
-  /// 2 Gs (1 + 2 C) (Skalak). The iteration converges while the true tangent stays below twice this plus the mass.
+  /// Stiffness of the constant stand-in for the in-plane Hessian (method 3): 5.5 B + C (27.5 + 5000 pN/um)
+  /// for the paper's law, else the largest eigenvalue of the rest tangent in the stretches: 6 Gs
+  /// (neo-Hookean), 2 Gs (1 + 2 C) (Skalak). The iteration converges while the true tangent stays below twice
+  /// this plus the mass.
   double standin() const;
 };
 

@@ -18,7 +18,8 @@ using mesh::Vec3;
 
 template <class Real>
 struct Membranes<Real>::Impl {
-  explicit Impl(std::shared_ptr<const CellType> t) : type(std::move(t)), tables(*type), vertices(tables.vertices) {
+  explicit Impl(std::shared_ptr<const CellType> t)
+      : type(std::move(t)), tables(*type), vertices(tables.vertices) {
     add_scratch();
   }
 
@@ -65,7 +66,8 @@ struct Membranes<Real>::Impl {
   void clear(int c) {
     set_positions(c, type->rest().vertices);
     for (int k = 0; k < vertices; ++k)
-      for (int d = 0; d < 3; ++d) velocity[layout().at(c, k, d)] = solution[layout().at(c, k, d)] = predicted[layout().at(c, k, d)] = 0;
+      for (int d = 0; d < 3; ++d)
+        velocity[layout().at(c, k, d)] = solution[layout().at(c, k, d)] = predicted[layout().at(c, k, d)] = 0;
   }
 
   void set_positions(int c, const std::vector<Vec3>& x) {
@@ -119,7 +121,8 @@ struct Membranes<Real>::Impl {
 };
 
 template <class Real>
-Membranes<Real>::Membranes(std::shared_ptr<const CellType> type) : impl_(std::make_unique<Impl>(std::move(type))) {}
+Membranes<Real>::Membranes(std::shared_ptr<const CellType> type)
+    : impl_(std::make_unique<Impl>(std::move(type))) {}
 template <class Real>
 Membranes<Real>::~Membranes() = default;
 template <class Real>
@@ -302,9 +305,9 @@ int Membranes<Real>::load(const std::byte* in) {
 
 template <class Real>
 void Membranes<Real>::set_positions(int c, const std::vector<Vec3>& x) {
-  require(static_cast<int>(x.size()) == vertices(),
-          "wrong number of vertices for this cell type (" + std::to_string(x.size()) + ") pass " +
-              std::to_string(vertices()));
+  require(static_cast<int>(x.size()) == vertices(), "wrong number of vertices for this cell type (" +
+                                                        std::to_string(x.size()) + ") pass " +
+                                                        std::to_string(vertices()));
   impl_->set_positions(c, x);
 }
 

@@ -45,7 +45,8 @@ double helfrich_energy(const CellType& type, const Field& x) {
     const auto left = mesh::cross(axis, mesh::subtract(x[e.v2], x[e.v0]));
     const auto right = mesh::cross(mesh::subtract(x[e.v3], x[e.v0]), axis);
     const double length = mesh::norm(axis);
-    const double theta = -std::atan2(mesh::dot(mesh::cross(left, right), axis) / length, mesh::dot(left, right));
+    const double theta =
+        std::atan2(mesh::dot(mesh::cross(left, right), axis) / length, mesh::dot(left, right));
     curvature[e.v0] += length * theta / 4;
     curvature[e.v1] += length * theta / 4;
   }
@@ -68,7 +69,8 @@ double edge_energy(const CellType& type, const Field& x) {
     mesh::accumulate(vector, r.w1, x[e.v1]);
     mesh::accumulate(vector, r.w2, x[e.v2]);
     mesh::accumulate(vector, r.w3, x[e.v3]);
-    const double length = std::sqrt(mesh::dot(vector, vector) + type.bending_epsilon() * type.bending_epsilon());
+    const double length =
+        std::sqrt(mesh::dot(vector, vector) + type.bending_epsilon() * type.bending_epsilon());
     sum += r.stiffness / 2 * (length - r.length) * (length - r.length);
   }
   return sum;
@@ -78,8 +80,10 @@ StretchGradient<double> law_gradient(const Material& m, const Stretch<double>& s
   switch (m.law) {
     case Law::paper:
       return SkalakHardening<double>{m.B, m.D}.gradient(s) + LocalArea<double>{m.C}.gradient(s);
-    case Law::neo_hookean: return NeoHookean<double>{m.Gs}.gradient(s);
-    case Law::skalak: return Skalak<double>{m.Gs, m.skalak_C}.gradient(s);
+    case Law::neo_hookean:
+      return NeoHookean<double>{m.Gs}.gradient(s);
+    case Law::skalak:
+      return Skalak<double>{m.Gs, m.skalak_C}.gradient(s);
   }
   return {0, 0};
 }
@@ -90,7 +94,8 @@ void add_edge_forces(const CellType& type, const Field& x, Field& f) {
     const auto& e = type.edges()[i];
     const auto& r = type.edge_rest()[i];
     const RestEdge<double> rest{r.w1, r.w2, r.w3, r.stiffness, r.length};
-    const V vector = edge_vector(rest, between(x, e.v0, e.v1), between(x, e.v0, e.v2), between(x, e.v0, e.v3));
+    const V vector =
+        edge_vector(rest, between(x, e.v0, e.v1), between(x, e.v0, e.v2), between(x, e.v0, e.v3));
     const double c = edge_bending_factor(rest, epsilon2, vector);
     push(f, e.v0, -c * r.w0 * vector);
     push(f, e.v1, -c * r.w1 * vector);
@@ -143,10 +148,12 @@ void axpy(double s, const Field& a, Field& y) {
   for (std::size_t k = 0; k < a.size(); ++k) mesh::accumulate(y[k], s, a[k]);
 }
 
-/// The incremental potential g(d) = sum metric/(2 h^2) |d - h v_pred|^2 + E(x + d) + beta/(2h) d Lap d, and its slope.
+/// The incremental potential g(d) = sum metric/(2 h^2) |d - h v_pred|^2 + E(x + d) + beta/(2h) d Lap d, and
+/// its slope.
 class Potential {
  public:
-  Potential(const CellType& type, const State& s, const Field& v_pred) : type_(type), s_(s), v_pred_(v_pred) {}
+  Potential(const CellType& type, const State& s, const Field& v_pred)
+      : type_(type), s_(s), v_pred_(v_pred) {}
 
   double value(const Field& d) const {
     auto x = s_.x;
@@ -157,7 +164,8 @@ class Potential {
       const auto gap = mesh::subtract(d[k], mesh::scale(h, v_pred_[k]));
       sum += type_.metric()[k] / (2 * h * h) * mesh::dot(gap, gap);
     }
-    if (type_.material().rayleigh_beta > 0) sum += type_.material().rayleigh_beta / (2 * h) * inner(d, lap(d));
+    if (type_.material().rayleigh_beta > 0)
+      sum += type_.material().rayleigh_beta / (2 * h) * inner(d, lap(d));
     return sum;
   }
   /// -dg/dd; \p scale receives the size of the inertial forces.
@@ -239,8 +247,12 @@ Energy energy(const CellType& type, const Field& x) {
         e.stretch += r.area * skalak_hardening_energy(m.B, m.D, s1, s2);
         e.area += r.area * local_area_energy(m.C, s1, s2);
         break;
-      case Law::neo_hookean: e.stretch += r.area * neo_hookean_energy(m.Gs, s1, s2); break;
-      case Law::skalak: e.stretch += r.area * skalak_energy(m.Gs, m.skalak_C, s1, s2); break;
+      case Law::neo_hookean:
+        e.stretch += r.area * neo_hookean_energy(m.Gs, s1, s2);
+        break;
+      case Law::skalak:
+        e.stretch += r.area * skalak_energy(m.Gs, m.skalak_C, s1, s2);
+        break;
     }
   }
   if (m.bending == Bending::paper) e.bending = edge_energy(type, x);
@@ -270,7 +282,8 @@ Field forces(const CellType& type, const Field& x) {
   if (m.bending == Bending::helfrich) add_helfrich_forces(type, x, f);
   const double square =
       m.volume_force == VolumeForce::gradient ? type.rest_gradient_square() : inner(gradient, gradient);
-  const double p = volume_factor(m.volume_modulus, type.rest_volume(), mesh::volume({x, type.rest().triangles}), square);
+  const double p =
+      volume_factor(m.volume_modulus, type.rest_volume(), mesh::volume({x, type.rest().triangles}), square);
   axpy(-p, gradient, f);
   return f;
 }
@@ -290,8 +303,8 @@ Field apply_inverse(const CellType& type, Field b) {
   return b;
 }
 
-SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, double tolerance, int max_iterations,
-                          bool project) {
+SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, double tolerance,
+                          int max_iterations, bool project) {
   const Potential potential(type, s, v_pred);
   Lbfgs lbfgs(type);
   const double h = type.h();

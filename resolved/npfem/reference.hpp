@@ -32,9 +32,9 @@ struct SolveReport {
   double residual = 0;  ///< |F - metric (v - v_pred)/h|, relative to its largest force
 };
 
-/// Implicit step to convergence: (metric/h)(v - v_pred) = F_int(x + h v) by L-BFGS on the incremental potential with
-/// H0 = N^{-1} and backtracking, until the relative residual is below \p tolerance. Then kappa damping and the
-/// momentum projection of the fast path (both only if \p project), x += h v.
+/// Implicit step to convergence: (metric/h)(v - v_pred) = F_int(x + h v) by L-BFGS on the incremental
+/// potential with H0 = N^{-1} and backtracking, until the relative residual is below \p tolerance. Then kappa
+/// damping and the momentum projection of the fast path (both only if \p project), x += h v.
 SolveReport step_implicit(const CellType& type, State& s, const std::vector<mesh::Vec3>& v_pred,
                           double tolerance = 1e-10, int max_iterations = 1000, bool project = true);
 
@@ -42,15 +42,14 @@ SolveReport step_implicit(const CellType& type, State& s, const std::vector<mesh
 std::vector<mesh::Vec3> apply_inverse(const CellType& type, std::vector<mesh::Vec3> b);
 
 /// External force on every vertex at (t, x, v).
-using ExternalForce =
-    std::function<void(double t, const std::vector<mesh::Vec3>& x, const std::vector<mesh::Vec3>& v,
-                       std::vector<mesh::Vec3>& force)>;
+using ExternalForce = std::function<void(double t, const std::vector<mesh::Vec3>& x,
+                                         const std::vector<mesh::Vec3>& v, std::vector<mesh::Vec3>& force)>;
 
 /// Classical Runge-Kutta of metric dv/dt = F_int(x) + F_ext: the explicit high-accuracy reference.
 void step_rk4(const CellType& type, State& s, double t, double dt, const ExternalForce& external);
 
 /// Kappa damping and the projection to the momenta of v_pred, as in the fast path, at positions x.
-void damp_and_project(const CellType& type, const std::vector<mesh::Vec3>& x, const std::vector<mesh::Vec3>& v_pred,
-                      std::vector<mesh::Vec3>& v);
+void damp_and_project(const CellType& type, const std::vector<mesh::Vec3>& x,
+                      const std::vector<mesh::Vec3>& v_pred, std::vector<mesh::Vec3>& v);
 
 }  // namespace hemowalk::npfem

@@ -70,7 +70,8 @@ class Body {
   RigidMotion<T> motion_about_centre(const Momentum<T>& p) const {
     const auto& l = p.angular;
     return {(1 / mass_) * p.linear,
-            {xx_ * l.x + xy_ * l.y + xz_ * l.z, xy_ * l.x + yy_ * l.y + yz_ * l.z, xz_ * l.x + yz_ * l.y + zz_ * l.z}};
+            {xx_ * l.x + xy_ * l.y + xz_ * l.z, xy_ * l.x + yy_ * l.y + yz_ * l.z,
+             xz_ * l.x + yz_ * l.y + zz_ * l.z}};
   }
 
  private:

@@ -1,16 +1,19 @@
 #pragma once
-/// \file Helfrich bending with a reference curvature, discretised after Juelicher (J. Phys. II 6, 1797, 1996).
+/// \file Helfrich bending with a reference curvature, discretised after Juelicher (J. Phys. II 6, 1797,
+/// 1996).
 ///
-/// E = 2 k_b sum_i (M_i - A_i H0)^2/A_i, M_i = 1/4 sum_(edges at i) l theta the integrated mean curvature of vertex
-/// i (theta the signed angle between the face normals, > 0 where convex), A_i a third of the adjacent areas.
+/// E = 2 k_b sum_i (M_i - A_i H0)^2/A_i, M_i = 1/4 sum_(edges at i) l theta the integrated mean curvature of
+/// vertex i (theta the signed angle between the face normals, > 0 where convex), A_i a third of the adjacent
+/// areas.
 
 #include "resolved/npfem/terms/stretch.hpp"
 
 namespace hemowalk::npfem {
 
-/// arctan(y/x) for |y/x| of any size with x^2 + y^2 = 1: halves the angle three times, then a series; no branches.
+/// arctan(y/x) for |y/x| of any size with x^2 + y^2 = 1: halves the angle three times, then a series; no
+/// branches.
 template <class T>
-HEMO_HD inline T angle_of(const T& cosine, const T& sine) {
+HEMO_HD HEMO_INLINE T angle_of(const T& cosine, const T& sine) {
   using std::max;
   using std::sqrt;
   T u = sine / max(1 + cosine, T(1e-6f));  // tan(theta/2)
@@ -33,7 +36,7 @@ struct Dihedral {
 
 /// \p e1, \p e2, \p e3: x1 - x0, x2 - x0, x3 - x0.
 template <class T>
-HEMO_HD inline Dihedral<T> dihedral(const Vector<T>& e1, const Vector<T>& e2, const Vector<T>& e3) {
+HEMO_HD HEMO_INLINE Dihedral<T> dihedral(const Vector<T>& e1, const Vector<T>& e2, const Vector<T>& e3) {
   using std::sqrt;
   Dihedral<T> d;
   const Vector<T> left = cross(e1, e2), right = cross(e3, e1);  // area normals, both outward
@@ -44,8 +47,8 @@ HEMO_HD inline Dihedral<T> dihedral(const Vector<T>& e1, const Vector<T>& e2, co
   const T left2 = dot(left, left), right2 = dot(right, right);
   const T per_norms = 1 / sqrt(left2 * right2);
   const T cosine = dot(left, right) * per_norms;
-  // (left x right) . tangent < 0 where the surface is convex
-  const T sine = -dot(cross(left, right), d.tangent) * per_norms;
+  // positive where the surface is convex
+  const T sine = dot(cross(left, right), d.tangent) * per_norms;
   d.theta = angle_of(cosine, sine);
   const Vector<T> a = (1 / left2) * left, b = (1 / right2) * right;
   // Raising an opposite vertex along its face's normal flattens a convex edge.

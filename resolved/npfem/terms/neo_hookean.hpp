@@ -12,7 +12,7 @@ struct NeoHookean {
 
   template <class T>
   HEMO_HD StretchGradient<T> gradient(const Stretch<T>& s) const {
-    return {T(Gs * S(0.5f)), -Gs / (s.J * s.J * s.J)};
+    return {T(Gs * S(0.5f)), T(0), -Gs / (s.J * s.J * s.J)};
   }
 };
 

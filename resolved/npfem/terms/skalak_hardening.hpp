@@ -12,16 +12,15 @@ struct SkalakHardening {
 
   template <class T>
   HEMO_HD StretchGradient<T> gradient(const Stretch<T>& s) const {
-    const T trace = s.t - 2;          // sum of s_k - 1
-    const T det = s.J - s.t + 1;      // their product
+    const T trace = s.t - 2;      // sum of s_k - 1
+    const T det = s.J - s.t + 1;  // their product
     const T square = trace * trace - 2 * det;
     // sum (s-1)^4 = square^2 - 2 det^2
     const S d8 = D * S(0.125f);
     const T w_t = d8 * (4 * (square * (trace + 1) + det));
     const T w_J = d8 * (-4 * (square + det));
     // sum s^4 = I1^2 - 2 J^2, sum s^2 = I1
-    const StretchGradient<T> spring{(B * S(0.125f)) * (s.I1 - 1), (B * S(-0.25f)) * s.J};
-    return from_trace(s, w_t, w_J) + spring;
+    return {(B * S(0.125f)) * (s.I1 - 1), w_t, w_J - (B * S(0.25f)) * s.J};
   }
 };
 

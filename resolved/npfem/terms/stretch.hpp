@@ -18,23 +18,23 @@ struct Vector {
   T x, y, z;
 };
 template <class T>
-HEMO_HD inline Vector<T> operator+(const Vector<T>& a, const Vector<T>& b) {
+HEMO_HD HEMO_INLINE Vector<T> operator+(const Vector<T>& a, const Vector<T>& b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class T>
-HEMO_HD inline Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
+HEMO_HD HEMO_INLINE Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
   return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class S, class T>
-HEMO_HD inline Vector<T> operator*(const S& s, const Vector<T>& a) {
+HEMO_HD HEMO_INLINE Vector<T> operator*(const S& s, const Vector<T>& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
 template <class T>
-HEMO_HD inline T dot(const Vector<T>& a, const Vector<T>& b) {
+HEMO_HD HEMO_INLINE T dot(const Vector<T>& a, const Vector<T>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class T>
-HEMO_HD inline Vector<T> cross(const Vector<T>& a, const Vector<T>& b) {
+HEMO_HD HEMO_INLINE Vector<T> cross(const Vector<T>& a, const Vector<T>& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
@@ -44,20 +44,14 @@ struct Stretch {
   T I1, J, t;
 };
 
-/// Derivative of the energy per rest area with respect to I1 and J.
+/// Derivative of the energy per rest area, written as w(I1, t, J): each law uses the invariants that suit it.
 template <class T>
 struct StretchGradient {
-  T I1, J;
+  T I1, t, J;
 };
 template <class T>
-HEMO_HD inline StretchGradient<T> operator+(const StretchGradient<T>& a, const StretchGradient<T>& b) {
-  return {a.I1 + b.I1, a.J + b.J};
-}
-/// From derivatives with respect to t and J at fixed t: t^2 = I1 + 2 J.
-template <class T>
-HEMO_HD inline StretchGradient<T> from_trace(const Stretch<T>& s, const T& w_t, const T& w_J) {
-  const T per_t = w_t / s.t;
-  return {0.5f * per_t, w_J + per_t};
+HEMO_HD HEMO_INLINE StretchGradient<T> operator+(const StretchGradient<T>& a, const StretchGradient<T>& b) {
+  return {a.I1 + b.I1, a.t + b.t, a.J + b.J};
 }
 
 /// Rest data of a triangle: B = inverse metric of its edge vectors, its determinant, and the area.
@@ -73,12 +67,12 @@ struct Triangle {
   T g11, g12, g22;
 };
 template <class T>
-HEMO_HD inline Triangle<T> make_triangle(const Vector<T>& e1, const Vector<T>& e2) {
+HEMO_HD HEMO_INLINE Triangle<T> make_triangle(const Vector<T>& e1, const Vector<T>& e2) {
   return {e1, e2, cross(e1, e2), dot(e1, e1), dot(e1, e2), dot(e2, e2)};
 }
 
 template <class S, class T>
-HEMO_HD inline Stretch<T> stretch_of(const RestTriangle<S>& rest, const Triangle<T>& now) {
+HEMO_HD HEMO_INLINE Stretch<T> stretch_of(const RestTriangle<S>& rest, const Triangle<T>& now) {
   using std::max;
   using std::sqrt;
   const T I1 = rest.b11 * now.g11 + 2 * (rest.b12 * now.g12) + rest.b22 * now.g22;
@@ -87,13 +81,17 @@ HEMO_HD inline Stretch<T> stretch_of(const RestTriangle<S>& rest, const Triangle
   return {I1, J, sqrt(I1 + 2 * J)};
 }
 
-/// Forces on vertices 1 and 2; vertex 0 takes minus their sum. K = A (2 w_I1 B + (w_J/J) det B adj g) is
+/// Forces on vertices 1 and 2; vertex 0 takes minus their sum. With t^2 = I1 + 2 J, the forces are
+/// -A (2 w_1 B + (w_J/J) det B adj g) [e1 e2], w_1 = w_I1 + w_t/(2t), w_J + w_t/t. The 2x2 matrix is
 /// symmetric, so the triangle's own force and torque vanish to round-off.
 template <class S, class T>
-HEMO_HD inline void stretch_forces(const RestTriangle<S>& rest, const Triangle<T>& now, const Stretch<T>& s,
-                                   const StretchGradient<T>& w, Vector<T>& f1, Vector<T>& f2) {
-  const T a = (2 * rest.area) * w.I1;
-  const T b = (rest.area * rest.det) * w.J / s.J;
+HEMO_HD HEMO_INLINE void stretch_forces(const RestTriangle<S>& rest, const Triangle<T>& now,
+                                        const Stretch<T>& s, const StretchGradient<T>& w, Vector<T>& f1,
+                                        Vector<T>& f2) {
+  const T both = 1 / (s.t * s.J);  // one division for 1/t and 1/J
+  const T per_t = w.t * (both * s.J);
+  const T a = rest.area * (2 * w.I1 + per_t);
+  const T b = (rest.area * rest.det) * ((w.J + per_t) * (both * s.t));
   const T k11 = a * rest.b11 + b * now.g22;
   const T k12 = a * rest.b12 - b * now.g12;
   const T k22 = a * rest.b22 + b * now.g11;
