@@ -9,6 +9,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/slip_correction.hpp"
 
 namespace hemowalk::resolved {
 
@@ -241,8 +242,8 @@ void Simulation<Real>::read_positions() {
 /// 2-3).
 template <class Real>
 void Simulation<Real>::predict() {
-  const Real theta_n = static_cast<Real>(scene_.coupling.theta_n),
-             theta_t = static_cast<Real>(scene_.coupling.theta_t);
+  const SlipCorrection<Real> correct{static_cast<Real>(scene_.coupling.theta_n),
+                                     static_cast<Real>(scene_.coupling.theta_t)};
   const auto gravity = half_body_force();
   const Real g[3] = {static_cast<Real>(gravity[0]), static_cast<Real>(gravity[1]),
                      static_cast<Real>(gravity[2])};
@@ -265,22 +266,18 @@ void Simulation<Real>::predict() {
               const Real inverse_metric = static_cast<Real>(1 / (group.mass[k] + h_ * group.weight[k]));
               for (int l = 0; l < lanes; ++l) {
                 Node4<Real>& u = reading_[slot + l];
-                const Node4<Real> J = impulse_[slot + l], F = contact_force_[slot + l];
+                const Node4<Real> F = contact_force_[slot + l];
+                const Real read[3] = {u.x, u.y, u.z};
+                const Real J[3] = {impulse_[slot + l].x, impulse_[slot + l].y, impulse_[slot + l].z};
                 Real w[3];
-                if (one_theta_) {  // the reading already holds theta I[F_prev/2]
-                  w[0] = u.x - theta_n * J.x * inverse_a, w[1] = u.y - theta_n * J.y * inverse_a,
-                  w[2] = u.z - theta_n * J.z * inverse_a;
+                if (one_theta_) {
+                  correct.combined(read, J, inverse_a, w);
                 } else {
                   const Node4<Real> f = force_reading_[slot + l];
-                  const Real c[3] = {f.x / 2 - J.x * inverse_a, f.y / 2 - J.y * inverse_a,
-                                     f.z / 2 - J.z * inverse_a};
+                  const Real half[3] = {f.x / 2, f.y / 2, f.z / 2};
                   const Real normal[3] = {normals[vector + l], normals[vector + lanes + l],
                                           normals[vector + 2 * lanes + l]};
-                  const Real along =
-                      (theta_n - theta_t) * (c[0] * normal[0] + c[1] * normal[1] + c[2] * normal[2]);
-                  w[0] = u.x + theta_t * c[0] + along * normal[0];
-                  w[1] = u.y + theta_t * c[1] + along * normal[1];
-                  w[2] = u.z + theta_t * c[2] + along * normal[2];
+                  correct(read, half, J, inverse_a, normal, w);
                 }
                 for (int d = 0; d < 3; ++d) w[d] += g[d];
                 u = {w[0], w[1], w[2], Real(0)};
