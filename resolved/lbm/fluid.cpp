@@ -38,11 +38,15 @@ Fluid<Real>::Fluid(const Block& block, const Parameters& parameters)
   fluid_nodes_ = block.interior();
   pitch_ = round_up(static_cast<std::size_t>(block.nx) + 2, 16);
   const auto ny = static_cast<std::size_t>(block.ny), nz = static_cast<std::size_t>(block.nz);
+  // The 19 streams of a sweep are one stride apart: keep them off the same few sets of the cache.
+  constexpr std::size_t line = 64 / sizeof(Real);
+  stride_ = round_up(ny * pitch_, line);
+  if (stride_ / line % 8 == 0) stride_ += line;
   rows_.resize((ny + 2) * (nz + 2));
   for (std::size_t k = 0; k < nz + 2; ++k)
     for (std::size_t j = 0; j < ny + 2; ++j)
-      rows_[k * (ny + 2) + j] = ((k + nz - 1) % nz * ny + (j + ny - 1) % ny) * directions * pitch_;
-  f_ = Array<Real>(ny * nz * directions * pitch_);
+      rows_[k * (ny + 2) + j] = (k + nz - 1) % nz * directions * stride_ + (j + ny - 1) % ny * pitch_;
+  f_ = Array<Real>(nz * directions * stride_);
   wall_sum_.resize(2 * nz);
   set_wall_terms();
 }
@@ -92,12 +96,12 @@ RowPointers<Real> Fluid<Real>::locate(int j, int k, bool swapped) const {
     const bool low = below(j - c[i][1]), high = above(j - c[i][1]);
     result.wall_term[i] = 0;
     if (!swapped) {
-      result.p[i] = f + row(j, k) + i * pitch_;
+      result.p[i] = f + row(j, k) + i * stride_;
     } else if (low || high) {  // came back from the wall: it waits in the node's own slot
-      result.p[i] = f + row(j, k) + i * pitch_;
+      result.p[i] = f + row(j, k) + i * stride_;
       result.wall_term[i] = wall_term_[high][i];
     } else {
-      result.p[i] = f + row(j - c[i][1], k - c[i][2]) + opposite(i) * pitch_ - c[i][0];
+      result.p[i] = f + row(j - c[i][1], k - c[i][2]) + opposite(i) * stride_ - c[i][0];
     }
   });
   return result;
@@ -113,10 +117,10 @@ void Fluid<Real>::locate_node(int i, int j, int k, bool swapped, Real* (&p)[dire
     const bool low = below(y), high = above(y);
     wall_term[d] = 0;
     if (!swapped || low || high || is_solid(x, y, z)) {
-      p[d] = f + row(j, k) + d * pitch_ + i;
+      p[d] = f + row(j, k) + d * stride_ + i;
       if (swapped && (low || high)) wall_term[d] = wall_term_[high][d];
     } else {
-      p[d] = f + row(y, z) + opposite(d) * pitch_ + (x + block_.nx) % block_.nx;
+      p[d] = f + row(y, z) + opposite(d) * stride_ + (x + block_.nx) % block_.nx;
     }
   }
 }
@@ -127,7 +131,7 @@ void Fluid<Real>::fill_ghosts(int j, int k) {
   Real* own = f_.data() + row(j, k);
   unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
     constexpr int i = decltype(direction)::value;
-    Real* slot = own + i * pitch_;
+    Real* slot = own + i * stride_;
     if constexpr (c[i][0] == -1) slot[-1] = slot[block_.nx - 1];
     if constexpr (c[i][0] == 1) slot[block_.nx] = slot[0];
   });
@@ -180,16 +184,15 @@ void Fluid<Real>::collide_row(int j, int k, View<const Node4<Real>> force) {
   const Node4<Real>* F = force.data ? force.data + block_.at(0, j, k) : nullptr;
   const Force3<Real> body{Real(parameters_.body_force[0]), Real(parameters_.body_force[1]),
                           Real(parameters_.body_force[2])};
-  const auto ahead = static_cast<std::ptrdiff_t>(directions * pitch_);
   const Wall wall = below(j - 1) ? Wall::lower : above(j + 1) ? Wall::upper : Wall::none;
   double outgoing[3] = {}, to_solid[3] = {};
   const auto run = [&](int begin, int end) {
     if (wall == Wall::lower) {
-      collide_run<Wall::lower>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+      collide_run<Wall::lower>(pointers, begin, end, F, body, rate_, outgoing);
     } else if (wall == Wall::upper) {
-      collide_run<Wall::upper>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+      collide_run<Wall::upper>(pointers, begin, end, F, body, rate_, outgoing);
     } else {
-      collide_run<Wall::none>(pointers, begin, end, F, body, rate_, ahead, outgoing);
+      collide_run<Wall::none>(pointers, begin, end, F, body, rate_, outgoing);
     }
   };
   const std::size_t r = static_cast<std::size_t>(k) * block_.ny + j;
@@ -285,13 +288,9 @@ void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity
   {
     const Slab my = slab();
     for (int k = my.begin; k < my.end; ++k) {
-      const bool follow = with_moments && k >= my.begin + 2;
-      for (int j = 0; j < ny; ++j) {
-        collide_row(j, k, force);
-        if (follow && j >= 2) moments_row(j - 1, k - 1, !swapped_, velocity);
-      }
-      if (follow && ny > 1) moments_row(ny - 1, k - 1, !swapped_, velocity);
-      if (follow) moments_row(0, k - 1, !swapped_, velocity);
+      for (int j = 0; j < ny; ++j) collide_row(j, k, force);
+      if (with_moments && k >= my.begin + 2)
+        for (int j = 0; j < ny; ++j) moments_row(j, k - 1, !swapped_, velocity);
     }
     if constexpr (with_moments) {
 #pragma omp barrier

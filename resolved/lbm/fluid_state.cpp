@@ -56,7 +56,7 @@ void Fluid<Real>::set_populations(int i, int j, int k,
                                   const std::function<FlowPoint(double, double, double)>& flow) {
   Real* own = f_.data() + row(j, k) + i;
   if (is_solid(i, j, k)) {
-    for (int d = 0; d < directions; ++d) own[d * pitch_] = 0;
+    for (int d = 0; d < directions; ++d) own[d * stride_] = 0;
     return;
   }
   const double at[3] = {i + 0.5, j + 0.5, k + 0.5};
@@ -74,8 +74,8 @@ void Fluid<Real>::set_populations(int i, int j, int k,
     double strain = 0;  // (c_a c_b - delta_ab/3) S_ab
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) strain += (c[d][a] * c[d][b] - (a == b ? 1.0 / 3 : 0)) * gradient[a][b];
-    own[d * pitch_] = static_cast<Real>(equilibrium(d, here.density, u) -
-                                        3 * weight(d) * here.density * parameters_.tau * strain);
+    own[d * stride_] = static_cast<Real>(equilibrium(d, here.density, u) -
+                                         3 * weight(d) * here.density * parameters_.tau * strain);
   }
 }
 
@@ -200,7 +200,7 @@ std::vector<std::byte> Fluid<Real>::save() const {
   for (int k = 0; k < block_.nz; ++k)
     for (int j = 0; j < block_.ny; ++j)
       for (int d = 0; d < directions; ++d, out += line)
-        std::memcpy(out, f_.data() + row(j, k) + d * pitch_, line);
+        std::memcpy(out, f_.data() + row(j, k) + d * stride_, line);
   return state;
 }
 
@@ -221,7 +221,7 @@ void Fluid<Real>::load(View<const std::byte> state) {
   for (int k = 0; k < block_.nz; ++k)
     for (int j = 0; j < block_.ny; ++j) {
       for (int d = 0; d < directions; ++d, in += line)
-        std::memcpy(f_.data() + row(j, k) + d * pitch_, in, line);
+        std::memcpy(f_.data() + row(j, k) + d * stride_, in, line);
       fill_ghosts(j, k);
     }
 }
