@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "resolved/npfem/rigid_motion.hpp"
+#include "resolved/mesh/rigid_motion.hpp"
 
 namespace hemowalk::npfem {
 namespace {
@@ -287,11 +287,11 @@ template <class Real>
 /// or not.
 template <class Real>
 [[gnu::flatten]] void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool damping) {
-  Inertia<P> inertia;
-  Momentum<P> wanted, solved;
+  mesh::Inertia<P> inertia;
+  mesh::Momentum<P> wanted, solved;
   for_chunks(t_.vertices, [&](int begin, int end) {
-    Inertia<P> i;
-    Momentum<P> w, s;
+    mesh::Inertia<P> i;
+    mesh::Momentum<P> w, s;
     for (int k = begin; k < end; ++k) {
       const V r = load3(b.offset, k), v = t_.inverse_h * load3(s_.increment.data(), k);
       store3(v, b.solution, k);
@@ -301,12 +301,12 @@ template <class Real>
     }
     inertia.add(i), wanted.add(w), solved.add(s);
   });
-  const Body<P> body(P(t_.total_metric), inertia);
+  const mesh::Body<P> body(P(t_.total_metric), inertia);
   const V c = body.centre();
   const auto before = body.motion(solved);
-  Momentum<P> left;  // of the damped part, about the centre
+  mesh::Momentum<P> left;  // of the damped part, about the centre
   for_chunks(t_.vertices, [&](int begin, int end) {
-    Momentum<P> part;
+    mesh::Momentum<P> part;
     for (int k = begin; k < end; ++k) {
       const V r = load3(b.offset, k) - c;
       V u = load3(b.solution, k) - (before.velocity + cross(before.spin, r));
@@ -316,8 +316,8 @@ template <class Real>
     }
     left.add(part);
   });
-  const Momentum<P> rigid{wanted.linear - left.linear,
-                          (wanted.angular - cross(c, wanted.linear)) - left.angular};
+  const mesh::Momentum<P> rigid{wanted.linear - left.linear,
+                                (wanted.angular - cross(c, wanted.linear)) - left.angular};
   const auto after = body.motion_about_centre(rigid);
   for (int k = 0; k < t_.vertices; ++k)
     add3(after.velocity + cross(after.spin, load3(b.offset, k) - c), b.velocity, k);

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <deque>
 
+#include "resolved/mesh/rigid_motion.hpp"
 #include "resolved/mesh/vector.hpp"
-#include "resolved/npfem/rigid_motion.hpp"
 #include "resolved/npfem/terms/edge_bending.hpp"
 #include "resolved/npfem/terms/helfrich.hpp"
 #include "resolved/npfem/terms/local_area.hpp"
@@ -350,20 +350,20 @@ void damp_and_project(const CellType& type, const Field& x, const Field& v_pred,
   for (const auto& p : x) mesh::accumulate(origin, 1.0 / static_cast<double>(x.size()), p);
   const auto arm = [&](std::size_t k) { return vec(mesh::subtract(x[k], origin)); };
   double mass = 0;
-  Inertia<double> inertia;
-  Momentum<double> wanted, solved;
+  mesh::Inertia<double> inertia;
+  mesh::Momentum<double> wanted, solved;
   for (std::size_t k = 0; k < x.size(); ++k) {
     mass += m[k];
     inertia.add(m[k], arm(k));
     wanted.add(m[k], arm(k), vec(v_pred[k]));
     solved.add(m[k], arm(k), vec(v[k]));
   }
-  const Body<double> body(mass, inertia);
-  const auto motion = [&](const RigidMotion<double>& r, std::size_t k) {
+  const mesh::Body<double> body(mass, inertia);
+  const auto motion = [&](const mesh::RigidMotion<double>& r, std::size_t k) {
     return r.velocity + cross(r.spin, arm(k) - body.centre());
   };
   const auto before = body.motion(solved);
-  Momentum<double> left;
+  mesh::Momentum<double> left;
   for (std::size_t k = 0; k < x.size(); ++k) {
     const V u = (1 - type.kappa()[k]) * (vec(v[k]) - motion(before, k));
     v[k] = {u.x, u.y, u.z};

@@ -15,10 +15,10 @@
 
 namespace hemowalk::rigid {
 
-/// Shape, own mass and mass metric of one kind of rigid body.
+/// Shape and mass metric of one kind of rigid body. Its own inertia enters through v_pred = (m v^n + ..)/(m +
+/// k a).
 struct BodyType {
   mesh::TriangleMesh rest;
-  std::vector<double> mass;    ///< m_k: the body's own inertia (0 is allowed)
   std::vector<double> metric;  ///< m_k + k a_k: the mass of the implicit step, > 0
   double h = 1;                ///< solid time step
 };

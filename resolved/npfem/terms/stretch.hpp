@@ -10,33 +10,11 @@
 #include <cmath>
 
 #include "core/portability.hpp"
+#include "resolved/mesh/lane_vector.hpp"
 
 namespace hemowalk::npfem {
 
-template <class T>
-struct Vector {
-  T x, y, z;
-};
-template <class T>
-HEMO_HD HEMO_INLINE Vector<T> operator+(const Vector<T>& a, const Vector<T>& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-template <class T>
-HEMO_HD HEMO_INLINE Vector<T> operator-(const Vector<T>& a, const Vector<T>& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-template <class S, class T>
-HEMO_HD HEMO_INLINE Vector<T> operator*(const S& s, const Vector<T>& a) {
-  return {s * a.x, s * a.y, s * a.z};
-}
-template <class T>
-HEMO_HD HEMO_INLINE T dot(const Vector<T>& a, const Vector<T>& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-template <class T>
-HEMO_HD HEMO_INLINE Vector<T> cross(const Vector<T>& a, const Vector<T>& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+using mesh::Vector;
 
 /// Invariants of the stretches.
 template <class T>

@@ -2,9 +2,9 @@
 /// \file Linear and angular momentum of a set of vertices and the rigid motion that carries it.
 /// T is a number or a pack of numbers (one body per lane).
 
-#include "resolved/npfem/terms/stretch.hpp"
+#include "resolved/mesh/lane_vector.hpp"
 
-namespace hemowalk::npfem {
+namespace hemowalk::mesh {
 
 /// Sums over vertices of mass m at r: the six numbers of the inertia tensor and the first moment.
 template <class T>
@@ -80,4 +80,4 @@ class Body {
   T xx_, yy_, zz_, xy_, xz_, yz_;
 };
 
-}  // namespace hemowalk::npfem
+}  // namespace hemowalk::mesh
