@@ -36,7 +36,7 @@ struct LatticeUnits {
   /// Bending modulus, N m.
   double bending(double n_m) const { return n_m * s * dt * dt / (density * dx * dx * dx * dx * dx); }
   /// Contact stiffness per area, N/m3.
-  double stiffness_density(double n_per_m3) const { return n_per_m3 * s * dt * dt / (density * dx * dx); }
+  double stiffness_density(double n_per_m3) const { return n_per_m3 * s * dt * dt / (density * dx); }
   /// Drag per membrane area, kg/(m2 s): not scaled by s (kappa_damping keeps its physical meaning per step).
   double drag_per_area(double kg_per_m2_s) const { return kg_per_m2_s * dt / (density * dx); }
   /// Rayleigh beta, s: divided by s like every time of the user.
