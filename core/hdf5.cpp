@@ -3,7 +3,6 @@
 #include <hdf5.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <numeric>
 #include <utility>
@@ -202,14 +201,10 @@ File File::create(const std::string& path) {
 File File::open(const std::string& path) {
   silence();
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
-    errno = ENOENT;
-    throw_io_error("cannot read", path);
-  }
-  if (!std::filesystem::is_regular_file(path, error)) {
-    errno = EISDIR;
-    throw_io_error("cannot read", path);
-  }
+  require(std::filesystem::exists(path, error),
+          [&] { return path + ": no such file (it was to be read) check the name"; });
+  require(!std::filesystem::is_directory(path, error),
+          [&] { return path + ": a folder (a file is expected) name the file inside"; });
   const hid_t id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   require(id >= 0,
           [&] { return path + ": not an HDF5 file, or damaged (" + reason() + ") is it the right file?"; });

@@ -73,6 +73,16 @@ std::string read_file(const std::string& path, std::size_t limit) {
   return text;
 }
 
+std::string read_input_file(const std::string& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  require(std::filesystem::exists(status),
+          [&] { return path + ": no such file (it was to be read) check the name"; });
+  require(!std::filesystem::is_directory(status),
+          [&] { return path + ": a folder (a file is expected) name the file inside"; });
+  return read_file(path);
+}
+
 AtomicFile::AtomicFile(std::string path)
     : path_(std::move(path)), temporary_(path_ + ".tmp" + std::to_string(::getpid())) {
   const auto folder = std::filesystem::path(path_).parent_path();

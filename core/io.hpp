@@ -11,6 +11,10 @@ namespace hemowalk {
 /// The whole file. \throws IoError if it cannot be read or is larger than \p limit bytes.
 std::string read_file(const std::string& path, std::size_t limit = std::size_t{1} << 28);
 
+/// The same for a file the user named: one that does not exist or is a folder is bad input. \throws
+/// InputError, IoError.
+std::string read_input_file(const std::string& path);
+
 /// Writes \p text to a temporary file beside \p path, syncs it to the disk and renames it. \throws IoError.
 void write_file_atomic(const std::string& path, const std::string& text);
 

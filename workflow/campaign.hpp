@@ -25,7 +25,10 @@ struct TrajectorySource {
   calibration::Synthetic synthetic;
   std::string path;  ///< import: folder of text files; file: trajectories.h5; absolute
   std::string text;  ///< canonical YAML of this source
-  std::string hash;  ///< 12 digits of the SHA-256 of `text` and the program version
+  std::string
+      hash;  ///< 12 digits of the SHA-256 of what decides the data (contents, not names) and the version
+  std::size_t point = 0;  ///< number of the list entry; its replicas differ in their seed only
+  int replica = 0;        ///< synthetic sources are replicated like scenes
 };
 
 struct Launcher {
@@ -83,6 +86,8 @@ struct Run {
 
 /// The format of campaign.yaml.
 const yaml::Field& campaign_format();
+/// The same with scene, sweep and cases unread: they are validated on their own, sweep values filled in.
+const yaml::Field& campaign_shell_format();
 
 /// Reads campaign.yaml. \throws InputError listing every problem as file:line:col, those in scene and coarse
 /// files too. \p overrides ("scene.fluid.tau=1", "replicas=3") are applied before validation.

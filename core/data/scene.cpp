@@ -245,7 +245,7 @@ Scene parse_scene(const std::string& text, const std::string& name,
 }
 
 Scene read_scene(const std::string& path, const std::vector<std::string>& overrides) {
-  return parse_scene(read_file(path), path, overrides);
+  return parse_scene(read_input_file(path), path, overrides);
 }
 
 }  // namespace hemowalk::data

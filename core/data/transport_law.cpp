@@ -294,7 +294,7 @@ TransportLaw parse_transport_law(const std::string& text, const std::string& nam
 }
 
 TransportLaw read_transport_law(const std::string& path) {
-  return parse_transport_law(read_file(path), path);
+  return parse_transport_law(read_input_file(path), path);
 }
 
 void write_transport_law(const TransportLaw& law, const std::string& path) {

@@ -103,6 +103,8 @@ Json schema_of(const Field& field) {
     case Field::Type::dictionary:
       json = {{"type", "object"}, {"additionalProperties", schema_of(field.parts[0])}};
       break;
+    case Field::Type::anything:
+      return Json::object();
     case Field::Type::any_of:
       json = {{"anyOf", Json::array()}};
       for (const Field& part : field.parts) json["anyOf"].push_back(schema_of(part));
@@ -188,6 +190,8 @@ std::string describe(const Field& field) {
       for (const Key& k : field.keys)
         text += (text.empty() ? "{" : " | {") + k.name + ": " + describe(k.field) + "}";
       break;
+    case Field::Type::anything:
+      return "any value";
     case Field::Type::any_of:
       for (const Field& part : field.parts) text += (text.empty() ? "" : " | ") + describe(part);
       break;

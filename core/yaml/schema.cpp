@@ -121,6 +121,11 @@ Field any_of(std::vector<Field> parts) {
   f.parts = std::move(parts);
   return f;
 }
+Field anything() {
+  Field f = of_type(Field::Type::anything);
+  f.nullable = true;
+  return f;
+}
 
 Key required(const std::string& name, const Field& field, const std::string& doc) {
   return key(Key::Presence::required, name, field, "", doc);

@@ -34,6 +34,7 @@ struct Field {
     dictionary,  ///< any keys, values like parts[0]
     tagged,      ///< a map with exactly one of `keys`: {robin: 1 mm/s}
     any_of,      ///< the first of `parts` that has the value's form
+    anything,    ///< any tree of texts: checked elsewhere
   };
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr std::size_t any_number = std::numeric_limits<std::size_t>::max();
@@ -90,6 +91,7 @@ Field map_of(std::vector<Key> keys);
 Field dictionary(const Field& value);
 Field tagged(std::vector<Key> keys);
 Field any_of(std::vector<Field> parts);
+Field anything();
 
 Key required(const std::string& name, const Field& field, const std::string& doc);
 Key optional(const std::string& name, const Field& field, const std::string& doc);

@@ -51,6 +51,8 @@ bool has_form_of(const Node& node, const Field& field) {
     case Field::Type::dictionary:
     case Field::Type::tagged:
       return node.is_map();
+    case Field::Type::anything:
+      return true;
     case Field::Type::any_of:
       return std::any_of(field.parts.begin(), field.parts.end(),
                          [&](const Field& f) { return has_form_of(node, f); });
@@ -144,6 +146,8 @@ class Validator {
         return dictionary(node, field, path);
       case Field::Type::tagged:
         return tagged(node, field, path);
+      case Field::Type::anything:
+        return tree(node);
       case Field::Type::any_of:
         for (const Field& part : field.parts)
           if (has_form_of(node, part)) return dispatch(node, part, path);
@@ -266,6 +270,19 @@ class Validator {
     }
     if (!valid && field.parts[0].type != Field::Type::map)
       result.type = Value::Type::none;  // no half-read vectors
+    return result;
+  }
+
+  static Value tree(const Node& node) {
+    Value result;
+    result.mark = node.mark;
+    result.type = node.is_list()     ? Value::Type::list
+                  : node.is_map()    ? Value::Type::map
+                  : node.is_scalar() ? Value::Type::text
+                                     : Value::Type::null;
+    result.word = node.text;
+    for (const Node& item : node.items) result.items.push_back(tree(item));
+    for (const Member& m : node.members) result.members[m.key] = tree(m.value);
     return result;
   }
 
