@@ -1,0 +1,307 @@
+#include "coarse/walkers.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "core/check.hpp"
+
+namespace hemowalk::coarse {
+
+namespace {
+
+using Wide = Lanes<16>;
+
+Wall make_wall(const Face& face, const Case& the_case, double D, double cell_free_layer) {
+  const double unit = the_case.height / top_position;
+  Wall wall{face.type, 0, 0, static_cast<float>(2 * D * the_case.dt / (unit * unit))};
+  if (face.type == Face::Type::robin) wall.uptake = static_cast<float>(face.rate * the_case.dt / unit);
+  if (face.type == Face::Type::trap) {
+    const double layer = face.layer > 0 ? face.layer : cell_free_layer;
+    require(face.rate > 0, "a trap needs a residence time > 0 (trap: tau) give it, e.g. trap: 1 s");
+    require(
+        std::isfinite(layer) && layer > 0,
+        "a trap needs the thickness of its layer (neither the face nor the law's cell_free_layer states one) "
+        "use a law with a cell-free layer");
+    wall.residence = static_cast<float>(face.rate / the_case.dt);
+    wall.uptake = static_cast<float>(layer / face.rate * the_case.dt / unit);
+  }
+  return wall;
+}
+
+/// Exact integration of an Ornstein-Uhlenbeck velocity over one step; t = dt/memory.
+void set_persistent(WalkModel& m, double t) {
+  const double keep = std::exp(-t), lost = -std::expm1(-t);
+  const double fresh2 = -std::expm1(-2 * t);
+  // variance of the displacement/memory given the velocity, 2t - 3 + 4 keep - keep^2, by series where it
+  // cancels
+  const double total = t > 0.02 ? 2 * t - 3 + 4 * keep - keep * keep
+                                : t * t * t * (2.0 / 3 - t / 2 + 7 * t * t / 30 - t * t * t / 12);
+  const double first = lost * lost / std::sqrt(fresh2), scale = 1 / std::sqrt(2 * t);
+  m.persistent.keep = static_cast<float>(keep);
+  m.persistent.fresh = static_cast<float>(std::sqrt(fresh2));
+  m.persistent.keep_in = static_cast<float>(lost * scale);
+  m.persistent.first = static_cast<float>(first * scale);
+  m.persistent.second = static_cast<float>(std::sqrt(std::max(total - first * first, 0.0)) * scale);
+  // Successive displacements are correlated; with sqrt(2 D) read at each step's start that brings a drift
+  // D' lost/(2 t) of its own (D'/2 for short steps, none for long ones): the rest is added.
+  m.gradient_drift = static_cast<float>(0.5 * (1 - lost / (2 * t)));
+}
+
+/// Unit variance in all: (1 - f) body^2 + f scale^2 a/(a - 2) = 1, the tail starting at twice the body.
+void set_heavy_tail(WalkModel& m, double exponent, double fraction) {
+  require(exponent > 2 && fraction > 0 && fraction < 0.5,
+          "the heavy-tailed step law is unusable (it needs tail_exponent > 2, or D is infinite, and 0 < "
+          "tail_fraction < 0.5) calibrate again");
+  const double body = 1 / std::sqrt(1 - fraction + fraction * 4 * exponent / (exponent - 2));
+  m.heavy_tail = {static_cast<float>(fraction), static_cast<float>(body), static_cast<float>(2 * body),
+                  static_cast<float>(1 / exponent)};
+}
+
+void check_case(const Case& c, const SlabLaw& law) {
+  require(c.height > 0 && c.dt > 0 && c.walkers > 0,
+          "height, dt and walkers must be positive (the slab or the ensemble is empty) correct the case");
+  require((c.bottom.type == Face::Type::periodic) == (c.top.type == Face::Type::periodic),
+          "one face is periodic and the other is not (a period joins both) make both periodic");
+  const double rms = std::sqrt(2 * law.largest_D() * c.dt);
+  require(rms <= c.height / 8, [&] {
+    return fmt::format(
+        "dt = {:g} s is too long for the slab (rms step {:g} um, height {:g} um) use dt <= {:g} s", c.dt,
+        rms * 1e6, c.height * 1e6, c.height * c.height / (128 * law.largest_D()));
+  });
+}
+
+}  // namespace
+
+Walkers::Walkers(const Case& c, const SlabLaw& law, const WalkSettings& settings)
+    : size_(c.walkers), height_(c.height), dt_(c.dt), shear_rate_(c.shear_rate) {
+  check_case(c, law);
+  const double unit = c.height / top_position;
+  const std::size_t cells = law.cells();
+  table_ = cells > 1 || law.has_drift();
+  require((cells & (cells - 1)) == 0, "the slab's law needs 2^n cells");
+  variance_ = Array<float>(cells + 2);
+  drift_ = Array<float>(cells + 2);
+  for (std::size_t i = 0; i < cells + 2; ++i) {
+    const std::size_t node = std::min(i, cells);
+    variance_[i] = static_cast<float>(2 * law.D[node] * c.dt / (unit * unit));
+    drift_[i] = static_cast<float>(law.v[node] * c.dt / unit);
+  }
+  model_.variance = variance_.data();
+  model_.drift = law.has_drift() ? drift_.data() : nullptr;
+  model_.shift = 30;
+  for (std::size_t n = cells; n > 1; n /= 2) --model_.shift;
+  model_.inverse_cell = std::ldexp(1.0f, -model_.shift);
+  model_.bottom = make_wall(c.bottom, c, law.D.front(), settings.cell_free_layer);
+  model_.top = make_wall(c.top, c, law.D.back(), settings.cell_free_layer);
+  model_.periodic = c.bottom.type == Face::Type::periodic;
+  model_.scheme = settings.scheme;
+  model_.seed = c.seed;
+  model_.step_law = settings.step_law;
+  if (settings.step_law == StepLaw::persistent) {
+    require(settings.memory > 0,
+            "a persistent walk needs a memory time > 0 (step_law: persistent) calibrate again");
+    set_persistent(model_, c.dt / settings.memory);
+  }
+  if (settings.step_law == StepLaw::heavy_tail)
+    set_heavy_tail(model_, settings.tail_exponent, settings.tail_fraction);
+  if (!settings.ito_drift) model_.gradient_drift = 0;
+
+  const std::int64_t n_blocks = (size_ + block - 1) / block;
+  y_ = Array<std::int32_t>(n_blocks * block);
+  offset_ = Array<std::uint16_t>(n_blocks * block);
+  if (settings.step_law == StepLaw::persistent) memory_ = Array<float>(n_blocks * block);
+  if (settings.track_flow_direction) way_ = Array<std::int64_t>(n_blocks * block);
+  active_.assign(n_blocks, block);
+  absorbed_.assign(n_blocks, {0, 0});
+  active_.back() = static_cast<std::int32_t>(size_ - (n_blocks - 1) * block);
+#pragma omp parallel for schedule(static)
+  for (std::int64_t i = 0; i < n_blocks * block; ++i) {
+    const RandomBits b = random_bits(c.seed, Stream::initial, i, 0);
+    y_[i] = i < size_ ? static_cast<std::int32_t>(b.word[0] >> 2) : state::nobody;
+    offset_[i] = static_cast<std::uint16_t>(i % block);
+    if (memory_.size()) memory_[i] = normal4(random_bits(c.seed, Stream::initial, i, 1)).value[0];
+  }
+}
+
+template <StepLaw S, bool Table, bool Drift>
+void Walkers::walk_block(std::int64_t b, std::int64_t begin, std::int64_t end) {
+  using Int = Wide::Int;
+  using Bits = Wide::Bits;
+  using Real = Wide::Real;
+  for (int i = 0; i < active_[b]; i += width * sets) {
+    const std::int64_t at = b * block + i;
+    LaneState<Wide> w[sets];
+    for (int j = 0; j < sets; ++j) {
+      const std::int64_t here = at + j * width;
+      const Int stored = load<std::int32_t, width>(&y_[here]);
+      const auto walking = stored >= Int(0);
+      w[j].code = select(walking, Int(0), stored);
+      w[j].y = select(walking, stored, Int(top_position / 2));
+      w[j].memory = S == StepLaw::persistent ? load<float, width>(&memory_[here]) : Real(0);
+      w[j].offset = Bits([&](auto lane) { return std::uint32_t{offset_[here + lane]}; });
+    }
+    if (way_.size() == 0) {
+      walk_steps<Wide, S, Table, Drift>(model_, w, b * block, begin, end, [](auto&&...) {});
+    } else {
+      walk_steps<Wide, S, Table, Drift>(model_, w, b * block, begin, end, [&](int j, const Int& before) {
+        alignas(64) std::int32_t both[width];
+        store<std::int32_t, width>(before + w[j].y - Int(top_position), both);
+        for (int l = 0; l < width; ++l) way_[at + j * width + l] += both[l];
+      });
+    }
+    for (int j = 0; j < sets; ++j) {
+      const std::int64_t here = at + j * width;
+      store<std::int32_t, width>(select(w[j].code == Int(0), w[j].y, w[j].code), &y_[here]);
+      if (S == StepLaw::persistent) store<float, width>(w[j].memory, &memory_[here]);
+    }
+  }
+}
+
+void Walkers::compact(std::int64_t b) {
+  std::int32_t kept = 0;
+  for (std::int64_t i = b * block; i < b * block + active_[b]; ++i) {
+    const std::int32_t y = y_[i];
+    if (state::is_absorbed(y)) {
+      ++absorbed_[b][y == state::absorbed_bottom ? 0 : 1];
+      continue;
+    }
+    if (y == state::nobody) continue;
+    const std::int64_t to = b * block + kept++;
+    y_[to] = y;
+    offset_[to] = offset_[i];
+    if (memory_.size()) memory_[to] = memory_[i];
+  }
+  active_[b] = kept;
+  for (std::int64_t i = b * block + kept; i % (width * sets) != 0; ++i) y_[i] = state::nobody;
+}
+
+template <StepLaw S>
+void Walkers::walk_leg(std::int64_t begin, std::int64_t end) {
+  const bool takes = model_.bottom.active() || model_.top.active();
+  std::int64_t walked = 0;
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : walked)
+  for (std::int64_t b = 0; b < blocks(); ++b) {
+    walked += active_[b] * (end - begin);
+    if (!table_)
+      walk_block<S, false, false>(b, begin, end);
+    else if (!model_.drift)
+      walk_block<S, true, false>(b, begin, end);
+    else
+      walk_block<S, true, true>(b, begin, end);
+    if (takes && way_.size() == 0) compact(b);
+  }
+  steps_walked_ += walked;
+}
+
+void Walkers::advance_to(std::int64_t step) {
+  while (step_ < step) {
+    const std::int64_t end = std::min(step_ + leg, step);
+    switch (model_.step_law) {
+      case StepLaw::gaussian:
+        walk_leg<StepLaw::gaussian>(step_, end);
+        break;
+      case StepLaw::persistent:
+        walk_leg<StepLaw::persistent>(step_, end);
+        break;
+      case StepLaw::heavy_tail:
+        walk_leg<StepLaw::heavy_tail>(step_, end);
+        break;
+    }
+    step_ = end;
+  }
+}
+
+Walkers::Counts Walkers::count(int bins) const {
+  Counts total;
+  total.histogram.assign(bins, 0);
+#pragma omp parallel
+  {
+    Counts mine;
+    mine.histogram.assign(bins, 0);
+#pragma omp for schedule(static)
+    for (std::int64_t b = 0; b < blocks(); ++b) {
+      for (int side = 0; side < 2; ++side) mine.absorbed[side] += absorbed_[b][side];
+      for (std::int64_t i = b * block; i < b * block + active_[b]; ++i) {
+        const std::int64_t y = y_[i];
+        if (y >= 0)
+          ++mine.histogram[std::min<std::int64_t>(y * bins >> 30, bins - 1)];
+        else if (state::is_trapped(static_cast<std::int32_t>(y)))
+          ++mine.trapped[-y % 2];
+        else if (state::is_absorbed(static_cast<std::int32_t>(y)))
+          ++mine.absorbed[y == state::absorbed_bottom ? 0 : 1];
+      }
+    }
+#pragma omp critical
+    {
+      for (int side = 0; side < 2; ++side) {
+        total.absorbed[side] += mine.absorbed[side];
+        total.trapped[side] += mine.trapped[side];
+      }
+      for (int k = 0; k < bins; ++k) total.histogram[k] += mine.histogram[k];
+    }
+  }
+  return total;
+}
+
+Walkers::Spread Walkers::spread() const {
+  require(way_.size() > 0, "the way along the flow was not tracked (it costs 8 bytes per walker) ask for it");
+  // way = sum of (y0 + y1 - height): twice the sum of the mid-step positions, seen from the middle of the
+  // slab
+  const double unit = shear_rate_ * dt_ * height_ / top_position / 2;
+  std::vector<std::array<double, 2>> sums(blocks());
+#pragma omp parallel for schedule(static)
+  for (std::int64_t b = 0; b < blocks(); ++b)
+    for (std::int64_t i = b * block; i < b * block + active_[b]; ++i) {
+      const double z = unit * static_cast<double>(way_[i]);
+      sums[b][0] += z;
+      sums[b][1] += z * z;
+    }
+  double s1 = 0, s2 = 0;
+  for (const auto& s : sums) {
+    s1 += s[0];
+    s2 += s[1];
+  }
+  const double n = static_cast<double>(size_), mean = s1 / n;
+  return {mean + shear_rate_ * height_ / 2 * dt_ * static_cast<double>(step_), s2 / n - mean * mean};
+}
+
+std::vector<double> Walkers::heights() const {
+  std::vector<double> result;
+  for (std::int64_t b = 0; b < blocks(); ++b)
+    for (std::int64_t i = b * block; i < b * block + active_[b]; ++i)
+      if (y_[i] >= 0) result.push_back(height_ * y_[i] / top_position);
+  return result;
+}
+
+double normal_numbers_per_second(double seconds) {
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  const auto start = now();
+  std::int64_t numbers = 0;
+  float sink = 0;
+#pragma omp parallel reduction(+ : numbers, sink)
+  {
+    const Wide::Bits offset([](auto l) { return std::uint32_t(l); });
+    Wide::Real sum = 0;
+    std::int64_t step = 0;
+    while (std::chrono::duration<double>(now() - start).count() < seconds) {
+      for (int i = 0; i < 4096; ++i, ++step) {
+        const auto words = lane_bits<Wide>(1, Stream::coarse_walk, 16 * omp_get_thread_num(), offset, step);
+        for (int k = 0; k < 2; ++k) {
+          const NormalPair<Wide> p(words.word[2 * k], words.word[2 * k + 1]);
+          const auto radius = stdx::sqrt(p.square);
+          sum += radius * p.cosine + radius * p.sine;
+        }
+      }
+      numbers += 4096 * 4 * Wide::width;
+    }
+    sink += stdx::reduce(sum);
+  }
+  const double wall = std::chrono::duration<double>(now() - start).count();
+  return std::isfinite(sink) ? static_cast<double>(numbers) / wall : 0;
+}
+
+}  // namespace hemowalk::coarse
