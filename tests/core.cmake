@@ -2,4 +2,6 @@ if(NOT TARGET hemowalk_data)
   return()
 endif()
 
-hemowalk_test(test_core_statistics SOURCES unit/test_core_statistics.cpp LINK hemowalk_data LABELS unit)
+foreach(name statistics units yaml io trajectories transport_law)
+  hemowalk_test(test_core_${name} SOURCES unit/test_core_${name}.cpp LINK hemowalk_data LABELS unit)
+endforeach()

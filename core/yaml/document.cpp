@@ -102,7 +102,9 @@ class TreeBuilder : public YAML::EventHandler {
       throw Stop{at(mark), "more than " + std::to_string(max_depth) +
                                " levels of nesting (no format needs them) is it the right file?"};
     if (!open_.empty() && open_.back().node->is_map() && !open_.back().key_pending)
-      throw Stop{at(mark), "a list or map as a key (keys are plain words) check the braces and colons"};
+      throw Stop{at(mark),
+                 "not valid YAML (a bracket is not closed, or a list or map stands as a key) check the "
+                 "braces, brackets and colons"};
     Node* node = add(leaf(mark, type, ""));
     open_.push_back({node, false, false, {}, {}, {}});
   }
