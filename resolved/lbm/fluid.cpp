@@ -79,6 +79,15 @@ void Fluid<Real>::set_body_force(const Vec3& force) {
   parameters_.body_force = force;
 }
 
+/// A slab has at least one plane, and enough nodes to be worth a fork.
+template <class Real>
+int Fluid<Real>::threads() const {
+  constexpr std::size_t worthwhile = 1024;
+  const auto slabs =
+      std::min<std::size_t>(block_.nz, std::max<std::size_t>(1, block_.interior() / worthwhile));
+  return std::min(omp_get_max_threads(), static_cast<int>(slabs));
+}
+
 template <class Real>
 typename Fluid<Real>::Slab Fluid<Real>::slab() const {
   const long threads = omp_get_num_threads(), t = omp_get_thread_num();
@@ -270,7 +279,7 @@ void Fluid<Real>::moments_row(int j, int k, bool swapped, View<Node4<Real>> velo
 
 template <class Real>
 void Fluid<Real>::moments(View<Node4<Real>> velocity) const {
-#pragma omp parallel
+#pragma omp parallel num_threads(threads())
   {
     const Slab my = slab();
     for (int k = my.begin; k < my.end; ++k)
@@ -284,7 +293,7 @@ template <class Real>
 template <bool with_moments>
 void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
   const int ny = block_.ny;
-#pragma omp parallel
+#pragma omp parallel num_threads(threads())
   {
     const Slab my = slab();
     for (int k = my.begin; k < my.end; ++k) {

@@ -131,6 +131,7 @@ class Fluid {
   struct Slab {
     int begin, end;  ///< planes of one thread
   };
+  int threads() const;
   Slab slab() const;
   std::size_t row(int j, int k) const { return rows_[(k + 1) * (std::size_t(block_.ny) + 2) + (j + 1)]; }
   bool below(int j) const { return parameters_.walls_y && j < 0; }

@@ -85,7 +85,7 @@ void Fluid<Real>::initialise(const std::function<FlowPoint(double, double, doubl
   steps_ = 0;
   for (Vec3& sum : wall_sum_) sum = {};
   for (Vec3& sum : solid_sum_) sum = {};
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) num_threads(threads())
   for (int k = 0; k < block_.nz; ++k)
     for (int j = 0; j < block_.ny; ++j)
       for (int i = 0; i < block_.nx; ++i) set_populations(i, j, k, flow);
@@ -122,7 +122,7 @@ WallImpulse Fluid<Real>::wall_impulse() const {
 template <class Real>
 Totals Fluid<Real>::totals() const {
   std::vector<Totals> plane(block_.nz);
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) num_threads(threads())
   for (int k = 0; k < block_.nz; ++k) {
     Totals sum;
     for (int j = 0; j < block_.ny; ++j)
@@ -153,7 +153,7 @@ PlanarProfiles Fluid<Real>::profiles(View<const Node4<Real>> force) const {
   PlanarProfiles result{std::vector<Vec3>(ny), std::vector<double>(ny), std::vector<double>(ny),
                         std::vector<double>(ny)};
   const double factor = -(1 - 0.5 / parameters_.tau);
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) num_threads(threads())
   for (int j = 0; j < ny; ++j) {
     double n = 0, density = 0, xy = 0, yz = 0;
     Vec3 velocity{};
