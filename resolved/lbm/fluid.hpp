@@ -125,6 +125,8 @@ class Fluid {
   static constexpr double bytes_per_node_advance() { return (2 * 19 + 4 + 2 * 4) * sizeof(Real); }
   /// The same of collide_and_stream() alone.
   static constexpr double bytes_per_node_collide() { return (2 * 19 + 4) * sizeof(Real); }
+  /// The same of moments() alone.
+  static constexpr double bytes_per_node_moments() { return (19 + 2 * 4) * sizeof(Real); }
   std::size_t memory_bytes() const;
 
  private:
