@@ -53,7 +53,11 @@ template <class Real>
 class Run {
  public:
   Run(const Scene& scene, const RunOptions& options, const std::vector<InitialCell>& cells)
-      : scene_(scene), options_(options), simulation_(scene, cells), recorder_(simulation_), schedule_(scene, simulation_.units()) {
+      : scene_(scene),
+        options_(options),
+        simulation_(scene, cells),
+        recorder_(simulation_),
+        schedule_(scene, simulation_.units()) {
     recorder_.trajectories().version = version();
   }
 
@@ -68,12 +72,15 @@ class Run {
       const std::int64_t step = simulation_.fluid_steps();
       outputs(step);
       const bool stop = options_.stop_requested && options_.stop_requested();
-      const bool by_clock = scene_.time.checkpoint_wall > 0 && omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
+      const bool by_clock =
+          scene_.time.checkpoint_wall > 0 && omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
       if (stop || by_clock || due(step, schedule_.checkpoint)) {
         checkpoint();
         last_checkpoint = omp_get_wtime();
       }
-      if (stop) throw Interrupted(fmt::format("stopped at {:.4g} s of {:.4g} s with a checkpoint", simulation_.time(), scene_.time.end));
+      if (stop)
+        throw Interrupted(fmt::format("stopped at {:.4g} s of {:.4g} s with a checkpoint", simulation_.time(),
+                                      scene_.time.end));
     }
     data::write_trajectories(recorder_.trajectories(), options_.out + "/trajectories.h5");
     fs::remove_all(folder());
@@ -83,8 +90,32 @@ class Run {
  private:
   std::string folder() const { return options_.out + "/checkpoint"; }
 
-  std::unique_ptr<SurfaceOutput> make_surfaces();
-  void write_surfaces();
+  std::unique_ptr<SurfaceOutput> make_surfaces() const {
+    std::vector<SurfaceKind> kinds;
+    for (const auto& group : simulation_.groups())
+      std::visit(
+          [&](const auto& g) {
+            kinds.push_back(
+                {scene_.cells.kinds[group.kind].name, g.rest().triangles, g.vertices(), g.count()});
+          },
+          group.cells);
+    return std::make_unique<SurfaceOutput>(options_.out, std::move(kinds),
+                                           simulation_.fluid_steps() > 0 ? simulation_.time() : -1);
+  }
+
+  void write_surfaces() {
+    std::vector<double> position;
+    position.reserve(surfaces_->position_size());
+    for (const auto& group : simulation_.groups())
+      std::visit(
+          [&](const auto& g) {
+            for (int c = 0; c < g.count(); ++c)
+              for (const auto& x : g.positions(c))
+                for (int d = 0; d < 3; ++d) position.push_back(simulation_.units().to_length(x[d]));
+          },
+          group.cells);
+    surfaces_->append(simulation_.time(), position);
+  }
 
   void outputs(std::int64_t step) {
     if (due(step, schedule_.average) && step > 0) recorder_.accumulate_profile(simulation_);
@@ -93,7 +124,8 @@ class Run {
     if (!due(step, schedule_.sample)) return;
     recorder_.sample(simulation_);
     guard();
-    if (options_.progress) options_.progress(static_cast<double>(step) / static_cast<double>(schedule_.end), state_line());
+    if (options_.progress)
+      options_.progress(static_cast<double>(step) / static_cast<double>(schedule_.end), state_line());
   }
 
   /// The watch over the physics, once per sample: what no later step could repair stops the run.
@@ -106,18 +138,23 @@ class Run {
         const bool outside = i % 3 == 1 && scene_.domain.geometry == data::Domain::Geometry::slab &&
                              (tracks.position[i] < lower || tracks.position[i] > upper);
         if (!std::isfinite(tracks.position[i]) || outside)
-          throw PhysicsError(fmt::format("{} {} was lost at step {} (its centre is {} um along {}) lower the acceleration", name,
-                                         tracks.id[cell], simulation_.fluid_steps(), 1e6 * tracks.position[i], "xyz"[i % 3]));
+          throw PhysicsError(fmt::format(
+              "{} {} was lost at step {} (its centre is {} um along {}) lower the acceleration", name,
+              tracks.id[cell], simulation_.fluid_steps(), 1e6 * tracks.position[i], "xyz"[i % 3]));
       }
     if (d.volume_error_max.back() > 0.2)
-      throw PhysicsError(fmt::format("a cell's volume is off by {:.0f} % at step {} (blow-up) lower the acceleration or raise coupling.iterations",
-                                     100 * d.volume_error_max.back(), simulation_.fluid_steps()));
+      throw PhysicsError(
+          fmt::format("a cell's volume is off by {:.0f} % at step {} (blow-up) lower the acceleration or "
+                      "raise coupling.iterations",
+                      100 * d.volume_error_max.back(), simulation_.fluid_steps()));
   }
 
   std::string state_line() const {
     const auto& d = recorder_.trajectories().diagnostics;
-    return fmt::format("t {:.1f} ms  volume error {:.2g}  momentum {:.1g}  overlap {:.2g} um", 1e3 * simulation_.time(),
-                       d.volume_error_max.back(), std::abs(d.momentum_residual[d.momentum_residual.size() - 1]), 1e6 * d.overlap_max.back());
+    return fmt::format("t {:.1f} ms  volume error {:.2g}  momentum {:.1g}  overlap {:.2g} um",
+                       1e3 * simulation_.time(), d.volume_error_max.back(),
+                       std::abs(d.momentum_residual[d.momentum_residual.size() - 1]),
+                       1e6 * d.overlap_max.back());
   }
 
   void checkpoint() {
@@ -125,8 +162,9 @@ class Run {
     data::write_trajectories(recorder_.trajectories(), folder() + "/trajectories.h5");
     const auto& t = recorder_.trajectories();
     Checkpoint c{scene_.input_sha256, version(), simulation_.save(), recorder_.save()};
-    c.recorder.insert(c.recorder.end(), {static_cast<double>(t.time.size()), static_cast<double>(t.profile.time.size()),
-                                         static_cast<double>(t.diagnostics.time.size())});
+    c.recorder.insert(c.recorder.end(),
+                      {static_cast<double>(t.time.size()), static_cast<double>(t.profile.time.size()),
+                       static_cast<double>(t.diagnostics.time.size())});
     write_checkpoint(c, folder() + "/state.bin");
   }
 
@@ -140,7 +178,9 @@ class Run {
     require(c.recorder.size() > 3, state + " is damaged (no record sizes) remove it to start afresh");
     simulation_.load({c.solver.data(), c.solver.size()});
     recorder_.trajectories() = data::read_trajectories(folder() + "/trajectories.h5");
-    const auto size = [&](int from_end) { return static_cast<std::size_t>(c.recorder[c.recorder.size() - from_end]); };
+    const auto size = [&](int from_end) {
+      return static_cast<std::size_t>(c.recorder[c.recorder.size() - from_end]);
+    };
     truncate(recorder_.trajectories(), size(3), size(2), size(1));
     c.recorder.resize(c.recorder.size() - 3);
     recorder_.load(c.recorder);
@@ -148,7 +188,8 @@ class Run {
   }
 
   /// The record may be newer than the state when a run was killed between the two files: drop the surplus.
-  static void truncate(data::Trajectories& t, std::size_t samples, std::size_t profiles, std::size_t diagnostics) {
+  static void truncate(data::Trajectories& t, std::size_t samples, std::size_t profiles,
+                       std::size_t diagnostics) {
     t.time.resize(samples);
     for (auto& [name, tracks] : t.kinds) {
       tracks.position.resize(samples * tracks.cells() * 3);
@@ -162,7 +203,8 @@ class Run {
     t.profile.shear_stress.resize(profiles * Y);
     auto& d = t.diagnostics;
     d.time.resize(diagnostics), d.momentum_residual.resize(3 * diagnostics);
-    for (auto* v : {&d.energy_residual, &d.mass_error, &d.volume_error_max, &d.max_speed_ratio, &d.overlap_max, &d.slip_rms})
+    for (auto* v : {&d.energy_residual, &d.mass_error, &d.volume_error_max, &d.max_speed_ratio,
+                    &d.overlap_max, &d.slip_rms})
       v->resize(diagnostics);
   }
 
@@ -195,7 +237,8 @@ RunSummary resolve(const Scene& scene, const RunOptions& options) {
   }
   const std::vector<InitialCell> cells = pack(scene);
   fs::create_directories(options.out);
-  if (scene.fluid.precision == data::Fluid::Precision::double_) return Run<double>(scene, options, cells).go();
+  if (scene.fluid.precision == data::Fluid::Precision::double_)
+    return Run<double>(scene, options, cells).go();
   return Run<float>(scene, options, cells).go();
 }
 

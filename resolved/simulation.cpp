@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "core/check.hpp"
@@ -74,8 +75,20 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
       return npfem::Membranes<Real>(
           std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
     };
-    Group<Real> group{make(), kind,  static_cast<std::int32_t>(bodies_), static_cast<std::uint32_t>(slots_),
-                      mass,   weight};
+    std::vector<std::array<double, 3>> share;
+    for (const auto& t : rest.triangles) {
+      const mesh::TriangleMesh one{{rest.vertices[t[0]], rest.vertices[t[1]], rest.vertices[t[2]]},
+                                   {{0, 1, 2}}};
+      const double third = mesh::area(one) / 3;
+      share.push_back({third / area[t[0]], third / area[t[1]], third / area[t[2]]});
+    }
+    Group<Real> group{make(),
+                      kind,
+                      static_cast<std::int32_t>(bodies_),
+                      static_cast<std::uint32_t>(slots_),
+                      mass,
+                      weight,
+                      std::move(share)};
     for (std::size_t c = 0; c < cells.size(); ++c) {
       if (cells[c].kind != kind) continue;
       std::visit(
@@ -238,6 +251,58 @@ void Simulation<Real>::read_positions() {
         group.cells);
 }
 
+/// The fluid receives J at the retracted point x - delta n, so the body must lose it there too, or every
+/// tangential traction would twist it by delta n x J. The couple of each triangle, q x n with q = -delta J,
+/// is applied as normal forces n (q . grad phi_i) on its corners: no net force, the right torque.
+template <class Real>
+void Simulation<Real>::add_retraction_couples() {
+  const Real delta = static_cast<Real>(scene_.coupling.retraction);
+  if (delta == 0) return;
+  for (auto& group : groups_)
+    std::visit(
+        [&](const auto& g) {
+          constexpr int lanes = std::decay_t<decltype(g)>::lanes;
+          const auto& triangles = g.rest().triangles;
+#pragma omp parallel for schedule(static)
+          for (int b = 0; b < g.batches(); ++b) {
+            const std::size_t slot = group.first_marker + static_cast<std::size_t>(b) * g.vertices() * lanes;
+            const Node4<Real>*x = vertices_.data() + slot, *J = impulse_.data() + slot;
+            Node4<Real>* F = contact_force_.data() + slot;
+            for (std::size_t t = 0; t < triangles.size(); ++t) {
+              const auto& corner = triangles[t];
+              const auto& share = group.triangle_share[t];
+              for (int l = 0; l < lanes; ++l) {
+                const Node4<Real>&p0 = x[corner[0] * lanes + l], &p1 = x[corner[1] * lanes + l],
+                      &p2 = x[corner[2] * lanes + l];
+                const Real e0[3] = {p2.x - p1.x, p2.y - p1.y, p2.z - p1.z},
+                           e1[3] = {p0.x - p2.x, p0.y - p2.y, p0.z - p2.z};
+                const Real N[3] = {e0[1] * e1[2] - e0[2] * e1[1], e0[2] * e1[0] - e0[0] * e1[2],
+                                   e0[0] * e1[1] - e0[1] * e1[0]};
+                const Real square = N[0] * N[0] + N[1] * N[1] + N[2] * N[2];
+                const Real scale = -delta / (square * std::sqrt(square) + std::numeric_limits<Real>::min());
+                Real q[3] = {0, 0, 0};
+                for (int i = 0; i < 3; ++i) {
+                  const Node4<Real>& j = J[corner[i] * lanes + l];
+                  const Real s = scale * static_cast<Real>(share[i]);
+                  q[0] += s * j.x, q[1] += s * j.y, q[2] += s * j.z;
+                }
+                // q . (N x e) = e . (q x N)
+                const Real c[3] = {q[1] * N[2] - q[2] * N[1], q[2] * N[0] - q[0] * N[2],
+                                   q[0] * N[1] - q[1] * N[0]};
+                const Real f0 = c[0] * e0[0] + c[1] * e0[1] + c[2] * e0[2],
+                           f1 = c[0] * e1[0] + c[1] * e1[1] + c[2] * e1[2];
+                const Real f[3] = {f0, f1, -f0 - f1};
+                for (int i = 0; i < 3; ++i) {
+                  Node4<Real>& to = F[corner[i] * lanes + l];
+                  to.x += f[i] * N[0], to.y += f[i] * N[1], to.z += f[i] * N[2];
+                }
+              }
+            }
+          }
+        },
+        group.cells);
+}
+
 /// Slip-corrected fluid velocity w at every vertex and v_pred = (m v^n + k a w + h F)/(m + k a) (method 5.2,
 /// 2-3).
 template <class Real>
@@ -368,6 +433,7 @@ void Simulation<Real>::step() {
     }
     {
       Stopwatch watch(timings_.solid);
+      add_retraction_couples();
       predict();
       move_cells();
       impulses();

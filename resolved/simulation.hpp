@@ -37,6 +37,7 @@ struct Group {
   std::uint32_t first_marker = 0;  ///< of vertex k of cell c: first_marker + layout().at(c, k)
   std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid
   std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx
+  std::vector<std::array<double, 3>> triangle_share;  ///< [T] part of each corner's area in this triangle
 
   int count() const {
     return std::visit([](const auto& g) { return g.count(); }, cells);
@@ -108,6 +109,7 @@ class Simulation {
   void build_coupling();
   void start_flow();
   void read_positions();
+  void add_retraction_couples();
   void predict();
   void move_cells();
   void impulses();

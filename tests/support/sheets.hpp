@@ -1,6 +1,6 @@
 #pragma once
-// Two flat sheets of markers with prescribed velocities in a channel whose walls move with them: the fluid outside the
-// gap is at rest relative to its sheet, so all friction comes from the gap. Lattice units.
+// Two flat sheets of markers with prescribed velocities in a channel whose walls move with them: the fluid
+// outside the gap is at rest relative to its sheet, so all friction comes from the gap. Lattice units.
 
 #include <cmath>
 #include <vector>
@@ -28,7 +28,9 @@ inline double relative_friction(const SheetCase& c) {
   p.lower_wall_velocity = faces.lower_wall, p.upper_wall_velocity = faces.upper_wall;
   lbm::Fluid<double> fluid(block, p);
   const double y0 = height / 2.0 + c.offset - c.gap / 2, y1 = y0 + c.gap;
-  fluid.initialise([&](double y) { return y < y0 ? -U / 2 : y > y1 ? U / 2 : -U / 2 + U * (y - y0) / c.gap; });
+  fluid.initialise([&](double y) {
+    return y < y0 ? -U / 2 : y > y1 ? U / 2 : -U / 2 + U * (y - y0) / c.gap;
+  });
   const int m = static_cast<int>(std::lround(n / c.spacing)), count = 2 * m * m;
   const double spacing = static_cast<double>(n) / m, a = c.chi * spacing * spacing;
   Array<ibm::Origin> origin(1);
@@ -36,7 +38,8 @@ inline double relative_friction(const SheetCase& c) {
   for (int s = 0; s < 2; ++s)
     for (int i = 0; i < m; ++i)
       for (int k = 0; k < m; ++k)
-        site[(s * m + i) * m + k] = {(i + .25) * spacing, s ? y1 + c.retraction : y0 - c.retraction, (k + .25) * spacing, 0};
+        site[(s * m + i) * m + k] = {(i + .25) * spacing, s ? y1 + c.retraction : y0 - c.retraction,
+                                     (k + .25) * spacing, 0};
   ibm::Markers<double> markers(block, faces, ibm::Kernel::phi4, std::vector<std::int32_t>(count, 0));
   markers.locate(origin.view(), site.view());
   const resolved::SlipCorrection<double> correct{c.theta_n, c.theta_t};
