@@ -69,10 +69,11 @@ std::vector<SweepKey> read_sweep(const Node* sweep, Problems& problems) {
   return keys;
 }
 
+/// Points of the sweep; beyond most_runs the number itself does not matter.
 std::size_t points_of(const Campaign& c) {
-  std::size_t n = 1;
+  std::size_t n = c.zip && !c.sweep.empty() ? most_runs : 1;
   for (const SweepKey& k : c.sweep)
-    n = c.zip ? k.values.size() : std::min(n * k.values.size(), most_runs + 1);
+    n = c.zip ? std::min(n, k.values.size()) : std::min(n * k.values.size(), most_runs + 1);
   return n;
 }
 

@@ -36,7 +36,7 @@ const Format formats[] = {
 
 constexpr const char* page_head = R"(# Reference
 
-Made by `hemowalk schema --reference`; do not edit by hand. The same tables validate the files.
+Made by `hemowalk schema reference`; do not edit by hand. The same tables validate the files.
 
 Every problem of a file is reported at once as `file:line:col: problem (why) suggestion`. Refused: duplicate keys, anchors and
 aliases, `yes/no/on/off` for truth values, numbers with leading zeros, NaN and infinity, values without their unit.
