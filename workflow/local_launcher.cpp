@@ -19,7 +19,9 @@ namespace hemowalk::workflow {
 namespace {
 
 using clock = std::chrono::steady_clock;
-double seconds_since(clock::time_point start) { return std::chrono::duration<double>(clock::now() - start).count(); }
+double seconds_since(clock::time_point start) {
+  return std::chrono::duration<double>(clock::now() - start).count();
+}
 
 /// A run in a child process.
 struct Active {
@@ -38,7 +40,8 @@ Status last_status(const Active& run, const Ending& ending, const std::string& f
     status.state = State::timed_out;
     status.reason = "over the time limit of " + format_duration(time_limit);
   } else if (ending.signal || !child_said_so) {
-    status.state = ending.exit_code == static_cast<int>(Exit::interrupted) ? State::interrupted : State::failed;
+    status.state =
+        ending.exit_code == static_cast<int>(Exit::interrupted) ? State::interrupted : State::failed;
     status.reason = describe(ending) + ", see log.txt";
   }
   if (ending.exit_code) status.exit_code = *ending.exit_code;
@@ -46,12 +49,14 @@ Status last_status(const Active& run, const Ending& ending, const std::string& f
   return status;
 }
 
-/// Reruns are bit-identical: what the input or the physics did wrong comes back, what the machine did may not.
+/// Reruns are bit-identical: what the input or the physics did wrong comes back, what the machine did may
+/// not.
 bool worth_retrying(const Status& status) {
   if (status.state == State::timed_out) return true;  // continues from its checkpoint
   if (status.state != State::failed) return false;
   const int code = status.exit_code.value_or(-1);
-  return code != static_cast<int>(Exit::usage) && code != static_cast<int>(Exit::physics) && code != static_cast<int>(Exit::refused);
+  return code != static_cast<int>(Exit::usage) && code != static_cast<int>(Exit::physics) &&
+         code != static_cast<int>(Exit::refused);
 }
 
 class Pool {
@@ -75,7 +80,9 @@ class Pool {
         for (const auto& a : active_) a.child->signal(SIGTERM);
         log_info("stopping: the runs in progress write their checkpoints");
       }
-      while (!stopping_ && !waiting_.empty() && static_cast<int>(active_.size()) < std::max(1, options_.slots)) start_next();
+      while (!stopping_ && !waiting_.empty() &&
+             static_cast<int>(active_.size()) < std::max(1, options_.slots))
+        start_next();
       if (stopping_ && active_.empty()) break;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       for (std::size_t k = active_.size(); k-- > 0;) look_after(k);
@@ -94,8 +101,13 @@ class Pool {
     const auto [j, tries] = waiting_.front();
     waiting_.pop_front();
     const Job& job = jobs_[j];
-    const std::vector<std::string> arguments{this_program(), "resolve", job.folder + "/scene.yaml", "--out", job.folder, "--resume"};
-    active_.push_back({j, clock::now(), std::make_unique<Child>(arguments, job.folder + "/log.txt", std::map<std::string, std::string>{{"OMP_NUM_THREADS", std::to_string(threads_)}}), tries + 1});
+    const std::vector<std::string> arguments{this_program(), "resolve",  job.folder + "/scene.yaml",
+                                             "--out",        job.folder, "--resume"};
+    active_.push_back({j, clock::now(),
+                       std::make_unique<Child>(
+                           arguments, job.folder + "/log.txt",
+                           std::map<std::string, std::string>{{"OMP_NUM_THREADS", std::to_string(threads_)}}),
+                       tries + 1});
   }
 
   void look_after(std::size_t k) {
@@ -139,7 +151,8 @@ class Pool {
   }
 
   void show() {
-    std::string note = fmt::format("{} of {} finished", std::count(done_.begin(), done_.end(), 1.0), jobs_.size());
+    std::string note =
+        fmt::format("{} of {} finished", std::count(done_.begin(), done_.end(), 1.0), jobs_.size());
     double cost = 0;
     for (std::size_t j = 0; j < jobs_.size(); ++j) cost += done_[j] * jobs_[j].cost;
     for (const auto& a : active_) {

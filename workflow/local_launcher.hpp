@@ -17,16 +17,16 @@ struct Job {
 enum class OnFailure { abort, retry, skip };
 
 struct LaunchOptions {
-  int slots = 1;            ///< runs at a time
-  int threads = 0;          ///< per run; 0 = the cores shared among the slots
+  int slots = 1;    ///< runs at a time
+  int threads = 0;  ///< per run; 0 = the cores shared among the slots
   OnFailure on_failure = OnFailure::abort;
-  int attempts = 2;         ///< with retry: how often a run is started in this call
-  double time_limit = 0;    ///< s of wall time per attempt; 0 = none
+  int attempts = 2;       ///< with retry: how often a run is started in this call
+  double time_limit = 0;  ///< s of wall time per attempt; 0 = none
 };
 
-/// Runs \p jobs; returns their last status in the same order. With `abort` the first failure stops the rest (they
-/// stay queued). A run that failed for a reason that would come back (bad input, blow-up: reruns are bit-identical)
-/// is not retried. On a stop signal children write checkpoints and the rest stays queued.
+/// Runs \p jobs; returns their last status in the same order. With `abort` the first failure stops the rest
+/// (they stay queued). A run that failed for a reason that would come back (bad input, blow-up: reruns are
+/// bit-identical) is not retried. On a stop signal children write checkpoints and the rest stays queued.
 std::vector<Status> run_jobs(const std::vector<Job>& jobs, const LaunchOptions& options);
 
 }  // namespace hemowalk::workflow

@@ -10,6 +10,7 @@
 #include "core/check.hpp"
 #include "core/log.hpp"
 #include "core/provenance.hpp"
+#include "core/yaml/document.hpp"
 #include "workflow/command.hpp"
 #include "workflow/process.hpp"
 
@@ -23,34 +24,20 @@ const std::map<std::string, std::string> later_verbs{
     {"stability", "maps where each method fails"},
     {"export", "converts results for other programs"}};
 
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
-      diagonal = above;
-    }
-  }
-  return row.back();
-}
-
 /// An unknown or future verb, said before the parser sees it. \throws InputError
 void check_verb(const CLI::App& program, const std::string& word) {
   if (word.empty() || word[0] == '-') return;
-  std::string nearest;
-  std::size_t best = 3;
+  std::vector<std::string> names;
   for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) {
     if (verb->get_name() == word) return;
-    if (const auto d = edit_distance(word, verb->get_name()); d < best) best = d, nearest = verb->get_name();
+    names.push_back(verb->get_name());
   }
   if (const auto later = later_verbs.find(word); later != later_verbs.end())
-    throw InputError("`" + word + "` is not in this version (" + later->second + "; planned) see hemowalk --help for what is");
+    throw InputError("`" + word + "` is not in this version (" + later->second +
+                     "; planned) see hemowalk --help for what is");
+  const auto near = yaml::nearest(word, names);
   throw InputError("unknown command `" + word + "` (it is none of the program's verbs) " +
-                   (nearest.empty() ? "see hemowalk --help" : "did you mean `" + nearest + "`?"));
+                   (near.empty() ? "see hemowalk --help" : "did you mean `" + near + "`?"));
 }
 
 /// The last word on an error: readable on stderr, and the one JSON object if that was asked for.
@@ -67,25 +54,32 @@ int fail(const Session& session, bool json, int code, const std::string& message
 int run(int argc, char** argv) {
   Session session;
   session.arguments.assign(argv, argv + argc);
-  CLI::App program{"Cellular blood flow: from resolved cells to the diffusion of platelets and transport at device scale.\n"
-                   "scene -> [resolve] -> trajectories -> [calibrate] -> transport law -> [coarse] -> report"};
+  CLI::App program{
+      "Cellular blood flow: from resolved cells to the diffusion of platelets and transport at device "
+      "scale.\n"
+      "scene -> [resolve] -> trajectories -> [calibrate] -> transport law -> [coarse] -> report"};
   program.name("hemowalk");
   program.set_version_flag("--version", program_description());
   program.require_subcommand(1);
-  program.footer("Start here:  hemowalk run examples/quickstart.yaml\n"
-                 "Exit codes: 0 done, 1 internal error, 2 bad input, 3 physics failed, 4 refused, 5 failed runs, 74 disk, 75 stopped.");
+  program.footer(
+      "Start here:  hemowalk run examples/quickstart.yaml\n"
+      "Exit codes: 0 done, 1 internal error, 2 bad input, 3 physics failed, 4 refused, 5 failed runs, 74 "
+      "disk, 75 stopped.");
   add_check(program, session);
   add_plan(program, session);
   add_run(program, session);
   add_status(program, session);
+#if defined(HEMOWALK_WITH_RESOLVED)
   add_resolve(program, session);
+#endif
   add_calibrate(program, session);
   add_coarse(program, session);
   add_report(program, session);
   add_schema(program, session);
   add_test(program, session);
 
-  const bool json = std::find(session.arguments.begin(), session.arguments.end(), "--json") != session.arguments.end();
+  const bool json =
+      std::find(session.arguments.begin(), session.arguments.end(), "--json") != session.arguments.end();
   try {
     if (argc > 1) check_verb(program, argv[1]);
     program.parse(argc, argv);
@@ -99,13 +93,17 @@ int run(int argc, char** argv) {
       std::fputs(program.help().c_str(), stderr);
       return static_cast<int>(Exit::usage);
     }
-    return fail(session, json, static_cast<int>(Exit::usage), std::string(error.what()) + " (usage) see hemowalk " + (argc > 1 && argv[1][0] != '-' ? argv[1] + std::string(" ") : "") + "--help");
+    return fail(session, json, static_cast<int>(Exit::usage),
+                std::string(error.what()) + " (usage) see hemowalk " +
+                    (argc > 1 && argv[1][0] != '-' ? argv[1] + std::string(" ") : "") + "--help");
   } catch (const Error& error) {
     return fail(session, json, static_cast<int>(error.code), error.what());
   } catch (const std::bad_alloc&) {
-    return fail(session, json, static_cast<int>(Exit::usage), "out of memory (the input asks for more than this machine has) make it smaller");
+    return fail(session, json, static_cast<int>(Exit::usage),
+                "out of memory (the input asks for more than this machine has) make it smaller");
   } catch (const std::exception& error) {
-    return fail(session, json, static_cast<int>(Exit::internal), std::string("internal error: ") + error.what());
+    return fail(session, json, static_cast<int>(Exit::internal),
+                std::string("internal error: ") + error.what());
   }
 }
 

@@ -53,7 +53,8 @@ Child::Child(const std::vector<std::string>& arguments, const std::string& log_f
   auto argv = pointers(argument_texts);
   auto envp = pointers(environment_texts);
   const int log = open(log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log < 0) throw IoError("cannot write " + log_file + " (" + std::strerror(errno) + ") check permissions and space");
+  if (log < 0)
+    throw IoError("cannot write " + log_file + " (" + std::strerror(errno) + ") check permissions and space");
   const pid_t parent = getpid();
   pid_ = fork();
   if (pid_ == 0) {
@@ -69,7 +70,9 @@ Child::Child(const std::vector<std::string>& arguments, const std::string& log_f
   }
   const int failure = errno;
   close(log);
-  if (pid_ < 0) throw IoError(std::string("cannot start a child process (") + std::strerror(failure) + ") free some memory");
+  if (pid_ < 0)
+    throw IoError(std::string("cannot start a child process (") + std::strerror(failure) +
+                  ") free some memory");
 }
 
 Child::~Child() {

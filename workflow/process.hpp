@@ -16,11 +16,12 @@ struct Ending {
   std::optional<int> signal;
 };
 
-/// A running child of this process. It gets SIGTERM when this process dies, so that it can write a checkpoint.
+/// A running child of this process. It gets SIGTERM when this process dies, so that it can write a
+/// checkpoint.
 class Child {
  public:
-  /// Starts \p arguments[0] with stdout and stderr appended to \p log_file, in this process's environment with
-  /// \p environment on top. \throws IoError
+  /// Starts \p arguments[0] with stdout and stderr appended to \p log_file, in this process's environment
+  /// with \p environment on top. \throws IoError
   Child(const std::vector<std::string>& arguments, const std::string& log_file,
         const std::map<std::string, std::string>& environment = {});
   Child(const Child&) = delete;

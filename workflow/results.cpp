@@ -16,7 +16,8 @@ std::size_t stride_for(std::size_t size, std::size_t count) { return std::max<st
 /// Rows [P][Y] of one quantity, averaged over the times after t0 and over runs.
 struct ProfileMean {
   std::vector<double> sum, weight;
-  void add(const std::vector<double>& rows, const data::Profiles& p, double t0, std::size_t components, std::size_t component) {
+  void add(const std::vector<double>& rows, const data::Profiles& p, double t0, std::size_t components,
+           std::size_t component) {
     const std::size_t heights = p.y.size();
     if (rows.size() != p.time.size() * heights * components) return;
     sum.resize(heights), weight.resize(heights);
@@ -29,18 +30,24 @@ struct ProfileMean {
   }
   Json json() const {
     auto values = Json::array();
-    for (std::size_t y = 0; y < sum.size(); ++y) values.push_back(weight[y] > 0 ? finite(sum[y] / weight[y]) : Json(nullptr));
+    for (std::size_t y = 0; y < sum.size(); ++y)
+      values.push_back(weight[y] > 0 ? finite(sum[y] / weight[y]) : Json(nullptr));
     return values;
   }
 };
 
 const char* name_of(coarse::Face::Type type) {
   switch (type) {
-    case coarse::Face::Type::absorb: return "absorb";
-    case coarse::Face::Type::robin: return "robin";
-    case coarse::Face::Type::trap: return "trap";
-    case coarse::Face::Type::periodic: return "periodic";
-    default: return "reflect";
+    case coarse::Face::Type::absorb:
+      return "absorb";
+    case coarse::Face::Type::robin:
+      return "robin";
+    case coarse::Face::Type::trap:
+      return "trap";
+    case coarse::Face::Type::periodic:
+      return "periodic";
+    default:
+      return "reflect";
   }
 }
 
@@ -51,7 +58,8 @@ Json exact_json(const coarse::Case& the_case, const data::TransportLaw& law) {
   const auto plain = [](const coarse::Face& f) { return f.type == Type::absorb || f.type == Type::reflect; };
   const int faces = absorbs(the_case.bottom) + absorbs(the_case.top);
   const double D = the_case.constant_D.value_or(law.core.D);
-  if (!faces || !plain(the_case.bottom) || !plain(the_case.top) || the_case.initial != "uniform" || !(D > 0)) return nullptr;
+  if (!faces || !plain(the_case.bottom) || !plain(the_case.top) || the_case.initial != "uniform" || !(D > 0))
+    return nullptr;
   Json exact;
   exact["D_m2_per_s"] = D;
   exact["same_problem"] = the_case.constant_D.has_value() || law.profile.y.empty();
@@ -143,9 +151,11 @@ Json blood_json(const std::vector<data::Trajectories>& runs, double t0) {
   const std::size_t heights = first.profile.y.size();
   const double gap = first.walls_y[1] - first.walls_y[0];
   double middle = 0;
-  for (const auto& v : json["velocity_z_m_per_s"]) middle += (v.is_number() ? v.get<double>() : 0) / static_cast<double>(heights);
+  for (const auto& v : json["velocity_z_m_per_s"])
+    middle += (v.is_number() ? v.get<double>() : 0) / static_cast<double>(heights);
   json["walls_y_m"] = finite(std::vector<double>{first.walls_y[0], first.walls_y[1]});
-  json["wall_velocity_m_per_s"] = finite(std::vector<double>{middle - first.shear_rate * gap / 2, middle + first.shear_rate * gap / 2});
+  json["wall_velocity_m_per_s"] =
+      finite(std::vector<double>{middle - first.shear_rate * gap / 2, middle + first.shear_rate * gap / 2});
   if (first.profile.shear_stress.size() == first.profile.time.size() * heights)
     for (std::size_t t = 0; t < first.profile.time.size(); ++t) {
       double sum = 0;
@@ -196,8 +206,12 @@ Json coarse_json(const coarse::Result& result, const coarse::Case& the_case, con
   json["name"] = the_case.name;
   for (auto& [key, value] : Json::parse(coarse::to_json(result, the_case)).items())
     if (key != "name") json[key] = value;
-  json["case"] = {{"height_m", the_case.height}, {"bottom", name_of(the_case.bottom.type)}, {"top", name_of(the_case.top.type)},
-                  {"dt_s", the_case.dt}, {"end_s", the_case.end}, {"shear_rate_1_per_s", the_case.shear_rate}};
+  json["case"] = {{"height_m", the_case.height},
+                  {"bottom", name_of(the_case.bottom.type)},
+                  {"top", name_of(the_case.top.type)},
+                  {"dt_s", the_case.dt},
+                  {"end_s", the_case.end},
+                  {"shear_rate_1_per_s", the_case.shear_rate}};
   json["exact"] = exact_json(the_case, law);
   return json;
 }

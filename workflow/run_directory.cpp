@@ -15,7 +15,8 @@
 namespace hemowalk::workflow {
 
 namespace {
-constexpr std::array<const char*, 6> state_names{"queued", "running", "done", "failed", "timed_out", "interrupted"};
+constexpr std::array<const char*, 6> state_names{"queued", "running",   "done",
+                                                 "failed", "timed_out", "interrupted"};
 }
 
 std::string to_string(State state) { return state_names[static_cast<std::size_t>(state)]; }
@@ -31,7 +32,8 @@ std::optional<Status> read_status(const std::string& run_folder) {
     const auto found = std::find(state_names.begin(), state_names.end(), name);
     if (found == state_names.end()) return std::nullopt;
     status.state = static_cast<State>(found - state_names.begin());
-    if (json.contains("exit_code") && json["exit_code"].is_number()) status.exit_code = json["exit_code"].get<int>();
+    if (json.contains("exit_code") && json["exit_code"].is_number())
+      status.exit_code = json["exit_code"].get<int>();
     status.reason = json.value("reason", "");
     status.attempt = json.value("attempt", 0);
     status.steps = json.value("steps", std::int64_t{0});
@@ -47,7 +49,8 @@ std::optional<Status> read_status(const std::string& run_folder) {
 void write_status(const std::string& run_folder, const Status& status) {
   nlohmann::ordered_json json;
   json["state"] = to_string(status.state);
-  json["exit_code"] = status.exit_code ? nlohmann::ordered_json(*status.exit_code) : nlohmann::ordered_json(nullptr);
+  json["exit_code"] =
+      status.exit_code ? nlohmann::ordered_json(*status.exit_code) : nlohmann::ordered_json(nullptr);
   json["reason"] = status.reason;
   json["attempt"] = status.attempt;
   json["steps"] = status.steps;

@@ -14,12 +14,12 @@ std::string to_string(State state);
 struct Status {
   State state = State::queued;
   std::optional<int> exit_code;
-  std::string reason;         ///< why it is in this state, one line
-  int attempt = 0;            ///< how often it was started
+  std::string reason;  ///< why it is in this state, one line
+  int attempt = 0;     ///< how often it was started
   std::int64_t steps = 0;
-  double wall = 0;            ///< s, all attempts together
-  double progress = 0;        ///< fraction done
-  std::string line;           ///< what it is doing, one line
+  double wall = 0;      ///< s, all attempts together
+  double progress = 0;  ///< fraction done
+  std::string line;     ///< what it is doing, one line
 };
 
 /// Empty if there is none or it cannot be understood (a run without a status starts anew).

@@ -92,6 +92,7 @@ function lineChart(parent, spec) {
     ctx.save();
     ctx.beginPath(); ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height); ctx.clip();
     ctx.font = `${11 * ratio}px system-ui, sans-serif`;
+    ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
     for (const m of spec.marks || []) {
       const a = u.valToPos(m.from * xs, "x", true), b = u.valToPos(m.to * xs, "x", true);
       ctx.fillStyle = withAlpha(css("--c5"), .16);
@@ -150,8 +151,12 @@ function forestPlot(parent, {title, note, unit, rows, failed}) {
   for (let d = Math.ceil(from); d <= to; ++d) {
     svg += `<line x1="${px(10 ** d)}" x2="${px(10 ** d)}" y1="${top}" y2="${height - 40}" stroke="var(--line)"/>` +
            `<text class="soft" x="${px(10 ** d)}" y="${height - 22}" text-anchor="middle">10${superscript(d)}</text>`;
-    for (let k = 2; k < 10; ++k) if (Math.log10(k) + d < to)
-      svg += `<line x1="${px(k * 10 ** d)}" x2="${px(k * 10 ** d)}" y1="${height - 45}" y2="${height - 40}" stroke="var(--line)"/>`;
+  }
+  for (let d = Math.floor(from); d <= to; ++d) for (let k = 2; k < 10; ++k) {
+    const v = k * 10 ** d, at = Math.log10(v);
+    if (at <= from || at >= to) continue;
+    svg += `<line x1="${px(v)}" x2="${px(v)}" y1="${height - 45}" y2="${height - 40}" stroke="var(--faint)"/>`;
+    if (to - from < 1.2 && (k === 2 || k === 5)) svg += `<text class="soft" x="${px(v)}" y="${height - 22}" text-anchor="middle">${scientific(v, 1)}</text>`;
   }
   const escape = s => String(s).replace(/&/g, "&amp;").replace(/</g, "&lt;");
   svg += `<text class="soft" x="${(label + width - right) / 2}" y="${height - 4}" text-anchor="middle">${escape(unit)}</text>`;

@@ -43,14 +43,19 @@ function headline() {
       el("small", {}, ` ± ${digits(core.D_sigma / scale, core.D_sigma / scale)} × 10${superscript(power)} m²/s`));
     const relative = core.D_sigma / core.D_m2_per_s;
     heads.append(el("div", {class: "card head"}, el("div", {class: "of"}, `D of ${kindName(k)}, wall-normal${many ? " · " + p.label : ""}`), value,
-      el("div", {class: "ci"}, `${scientific(core.D_m2_per_s * umSquared)} µm²/s · ${core.estimator || "core"} · ${c.n_platelets} cells` +
+      el("div", {class: "ci"}, `${scientific(core.D_m2_per_s * umSquared)} µm²/s · ${core.y_range_m && isNumber(core.y_range_m[0]) ? `start at y = ${digits(core.y_range_m[0] * um)}–${digits(core.y_range_m[1] * um)} µm, lag ${digits(core.lag_s * ms)} ms` : "core"} · ${c.n_platelets} ${kindName(k)}` +
         (p.runs && p.runs.length > 1 ? ` in ${p.runs.length} independent runs` : "") +
         (relative > .3 ? ` · wide: ±${Math.round(relative * 100)} %, too few cells or too short a run for more` : ""))));
   }
   page.append(heads);
   if (results.truth) page.append(el("div", {class: "banner ok"}, results.truth));
-  const verdict = points.flatMap(p => (calibrationOf(p) || {}).headline_verdict ? [calibrationOf(p).headline_verdict] : []);
-  if (verdict.length) page.append(el("p", {}, verdict[0]));
+  // One sentence per point: the source measured under the same conditions, or that there is none.
+  for (const p of points) {
+    const verdicts = ((calibrationOf(p) || {}).verdict || []).filter(v => v.statement);
+    const matched = verdicts.filter(v => v.matched_conditions);
+    if (verdicts.length) page.append(el("p", {class: "verdict"}, many ? el("strong", {}, p.label + ": ") : null,
+      matched.length ? matched[0].statement : "no published value was measured under these conditions; those that come near stand in the chart below."));
+  }
   page.append(el("p", {class: "note", style: "color:var(--soft);font-size:13px"},
     "D measures the wall-normal spreading in the red-cell-rich layer at the stated shear rate and hematocrit. Interior viscosity contrast is not modelled; " +
     "the damping parameter κ stands in for it."));
@@ -70,7 +75,7 @@ function conditions() {
     ["cells", p => p.cells && Object.entries(p.cells).map(([k, n]) => `${n} ${kindName(k)}`).join(", ")],
     ["record per run", p => p.record && isNumber(p.record.duration_s) && seconds(p.record.duration_s) + `, analysed from ${seconds(p.record.t0_s)}`],
     ["independent runs", p => p.runs && p.runs.length],
-    ["cell-free layer", p => calibrationOf(p) && isNumber(calibrationOf(p).cell_free_layer_m) && scientific(calibrationOf(p).cell_free_layer_m * um) + " µm"]];
+    ["cell-free layer", p => calibrationOf(p) && isNumber(calibrationOf(p).cell_free_layer_m) && calibrationOf(p).cell_free_layer_m > 0 && scientific(calibrationOf(p).cell_free_layer_m * um) + " µm"]];
   const shown = rows.filter(([, f]) => points.some(p => f(p)));
   s.append(el("div", {class: "card scroll"}, el("table", {},
     many ? el("tr", {}, el("th"), points.map(p => el("th", {}, p.label))) : null,
@@ -126,7 +131,7 @@ function msdCharts() {
 }
 
 function literature() {
-  const rows = [], estimates = {paper: "the paper's estimator", paper_all: "the paper's, all cells", plateau: "plateau", gls: "generalised least squares", green_kubo: "Green-Kubo"};
+  const rows = [], estimates = {paper: "the paper's estimator", paper_all: "the paper's, all cells", plateau: "plateau", gls: "generalised least squares", green_kubo: "Green-Kubo", confined: "plateau, confinement allowed for", without_jumps: "plateau, jumps removed"};
   points.forEach(p => {
     const c = calibrationOf(p);
     if (!c) return;
@@ -234,7 +239,7 @@ function runs() {
 }
 
 function warnings() {
-  const all = [...new Set([...(results.warnings || []), ...points.flatMap(p => Object.entries(p.calibrations || {}).flatMap(([k, c]) => (c.warnings || []).map(w => `${many ? p.label + ", " : ""}${kindName(k)}: ${w}`))),
+  const all = [...new Set([...(results.warnings || []), ...points.flatMap(p => (p.warnings || []).map(w => (many ? p.label + ": " : "") + w)), ...points.flatMap(p => Object.entries(p.calibrations || {}).flatMap(([k, c]) => (c.warnings || []).map(w => `${many ? p.label + ", " : ""}${kindName(k)}: ${w}`))),
     ...(results.coarse || []).flatMap(c => (c.warnings || []).map(w => `${c.name}: ${w}`))])];
   if (!all.length) return;
   section("Read this before quoting a number").append(el("div", {class: "card"}, el("ul", {class: "verdicts", style: "margin:0"}, all.map(w => el("li", {}, w)))));
@@ -244,7 +249,7 @@ function reproduce() {
   const s = section("How to reproduce it"), card = el("div", {class: "card"}); s.append(card);
   if (results.command) card.append(el("pre", {}, results.command));
   const facts = [["hemowalk", results.version], ["input sha256", results.input_sha256], ["seed", results.seed], ["written", results.written], ["machine", results.machine && `${results.machine.threads} threads`],
-    ["wall time", results.wall_s && seconds(results.wall_s)]].filter(([, v]) => v !== undefined && v !== null && v !== "");
+    ["program", results.program], ["wall time", results.wall_s && seconds(results.wall_s)]].filter(([, v]) => v !== undefined && v !== null && v !== "");
   card.append(el("table", {}, facts.map(([k, v]) => el("tr", {}, el("th", {}, k), el("td", {}, el("code", {}, String(v)))))));
   if (results.campaign_yaml) card.append(el("details", {}, el("summary", {}, "campaign, as it was understood"), el("pre", {}, results.campaign_yaml)));
   const laws = points.filter(p => p.law_yaml);

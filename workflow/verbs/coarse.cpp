@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 int coarse_walk(const Flags& flags) {
   require(!flags.file.empty(), "coarse needs a case (coarse.yaml) give its file: hemowalk coarse FILE");
   const auto the_case = coarse::read_case(flags.file, overrides(flags));
-  const auto law = the_case.constant_D ? data::TransportLaw::constant(*the_case.constant_D) : data::read_transport_law(the_case.law_file);
+  const auto law = the_case.constant_D ? data::TransportLaw::constant(*the_case.constant_D)
+                                       : data::read_transport_law(the_case.law_file);
   Progress progress(the_case.name);
   coarse::RunOptions options;
   options.strict = flags.strict;
@@ -26,7 +27,8 @@ int coarse_walk(const Flags& flags) {
   const auto result = coarse::run(the_case, law, options);
   for (const auto& w : result.warnings) log_warning(w);
 
-  const auto file = (fs::path(flags.out.empty() ? "." : flags.out) / (the_case.name + ".h5")).lexically_normal().string();
+  const auto file =
+      (fs::path(flags.out.empty() ? "." : flags.out) / (the_case.name + ".h5")).lexically_normal().string();
   coarse::write_result(result, the_case, file);
   if (flags.json) {
     auto object = nlohmann::ordered_json::parse(coarse::to_json(result, the_case));
@@ -34,10 +36,11 @@ int coarse_walk(const Flags& flags) {
     print_json(object);
     return 0;
   }
-  fmt::print("{}: {} walkers, {} ({})\n\n{:>12}{:>20}{:>14}{:>14}\n", the_case.name, result.walkers, result.method, result.reason, "time (s)",
-             "absorbed fraction", "sampling", "law");
+  fmt::print("{}: {} walkers, {} ({})\n\n{:>12}{:>20}{:>14}{:>14}\n", the_case.name, result.walkers,
+             result.method, result.reason, "time (s)", "absorbed fraction", "sampling", "law");
   for (std::size_t i = 0; i < result.time.size(); ++i)
-    fmt::print("{:>12.6g}{:>20.6f}{:>14.2g}{:>14.2g}\n", result.time[i], result.absorbed_fraction[i], result.absorbed_sigma[i],
+    fmt::print("{:>12.6g}{:>20.6f}{:>14.2g}{:>14.2g}\n", result.time[i], result.absorbed_fraction[i],
+               result.absorbed_sigma[i],
                i < result.absorbed_law_sigma.size() ? result.absorbed_law_sigma[i] : 0.0);
   fmt::print("\n{}\n", file);
   return 0;
@@ -46,9 +49,10 @@ int coarse_walk(const Flags& flags) {
 }  // namespace
 
 void add_coarse(CLI::App& program, Session& session) {
-  add_verb(program, session, "coarse", "transport law + device -> concentration, absorbed fraction",
-           takes_file | takes_set | takes_out | takes_threads | takes_seed | takes_strict,
-           [&session] { return coarse_walk(session.flags); }, "coarse.yaml");
+  add_verb(
+      program, session, "coarse", "transport law + device -> concentration, absorbed fraction",
+      takes_file | takes_set | takes_out | takes_threads | takes_seed | takes_strict,
+      [&session] { return coarse_walk(session.flags); }, "coarse.yaml");
 }
 
 }  // namespace hemowalk::workflow

@@ -16,12 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 
 int report(const Flags& flags) {
-  require(!flags.file.empty(), "report needs a campaign folder (the one `run` wrote into) give it: hemowalk report DIR");
+  require(!flags.file.empty(),
+          "report needs a campaign folder (the one `run` wrote into) give it: hemowalk report DIR");
   const fs::path folder = flags.file;
-  require(fs::exists(folder / "results.json"), flags.file + " holds no results.json (nothing was computed there) run the campaign first");
+  require(fs::exists(folder / "results.json"),
+          flags.file + " holds no results.json (nothing was computed there) run the campaign first");
   auto results = nlohmann::ordered_json::parse(read_file(folder / "results.json"), nullptr, false);
   require(results.is_object() && results.value("format", "") == "hemowalk.results/1",
-          (folder / "results.json").string() + " is no hemowalk.results/1 (it is damaged or of another program) run the campaign again");
+          (folder / "results.json").string() +
+              " is no hemowalk.results/1 (it is damaged or of another program) run the campaign again");
   // The states are read anew: a run may have been repeated since.
   if (results.contains("runs"))
     for (auto& run : results["runs"])
@@ -32,7 +35,9 @@ int report(const Flags& flags) {
   const std::string file = (flags.out.empty() ? folder : fs::path(flags.out)) / "report.html";
   write_file_atomic(file, render_report(results));
   if (flags.json) {
-    auto object = json_head("report", results["input_sha256"].is_string() ? results["input_sha256"].get<std::string>() : "", std::nullopt);
+    auto object = json_head(
+        "report", results["input_sha256"].is_string() ? results["input_sha256"].get<std::string>() : "",
+        std::nullopt);
     object["file"] = file;
     print_json(object);
   } else {
@@ -44,8 +49,9 @@ int report(const Flags& flags) {
 }  // namespace
 
 void add_report(CLI::App& program, Session& session) {
-  add_verb(program, session, "report", "make a campaign's report.html again", takes_file | takes_out,
-           [&session] { return report(session.flags); }, "campaign folder");
+  add_verb(
+      program, session, "report", "make a campaign's report.html again", takes_file | takes_out,
+      [&session] { return report(session.flags); }, "campaign folder");
 }
 
 }  // namespace hemowalk::workflow

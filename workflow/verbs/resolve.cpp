@@ -1,6 +1,7 @@
 /// \file hemowalk resolve: one scene -> trajectories. Also what the campaign starts in child processes.
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <chrono>
 #include <filesystem>
@@ -64,7 +65,8 @@ resolved::RunSummary run_with_status(const data::Scene& scene, const std::string
     save();
     throw;
   } catch (const std::exception& error) {
-    status.state = State::failed, status.exit_code = static_cast<int>(Exit::internal), status.reason = error.what();
+    status.state = State::failed, status.exit_code = static_cast<int>(Exit::internal),
+    status.reason = error.what();
     save();
     throw;
   }
@@ -78,12 +80,14 @@ int resolve(const Flags& flags, bool resume) {
   fs::create_directories(folder);
   Lock lock(folder + "/.lock");
   if (!lock.held()) log_info("another process works in " + folder + ": waiting for it to stop");
-  require(lock.wait(60), "another process works in " + folder + " (it holds the folder's lock) wait for it or choose another --out");
+  require(lock.wait(60), "another process works in " + folder +
+                             " (it holds the folder's lock) wait for it or choose another --out");
 
   const std::string copy = folder + "/scene.yaml";
   const bool known = fs::exists(copy);
-  require(!known || fs::equivalent(copy, flags.file) || data::read_scene(copy).input_sha256 == scene.input_sha256,
-          folder + " holds the run of another scene (its scene.yaml differs) choose another --out");
+  require(
+      !known || fs::equivalent(copy, flags.file) || data::read_scene(copy).input_sha256 == scene.input_sha256,
+      folder + " holds the run of another scene (its scene.yaml differs) choose another --out");
   if (!known) write_file_atomic(copy, scene.source_text);
   const auto summary = run_with_status(scene, folder, resume);
 
@@ -97,8 +101,9 @@ int resolve(const Flags& flags, bool resume) {
     object["hematocrit_true"] = finite(summary.hematocrit_true);
     print_json(object);
   } else {
-    fmt::print("{} red cells, {} platelets, hematocrit {:.1f} %, {} steps in {}: {}\n", summary.rbc, summary.platelets, 100 * summary.hematocrit_true,
-               summary.steps, format_duration(summary.wall), folder);
+    fmt::print("{} red cells, {} platelets, hematocrit {:.1f} %, {} steps in {}: {}\n", summary.rbc,
+               summary.platelets, 100 * summary.hematocrit_true, summary.steps, format_duration(summary.wall),
+               folder);
   }
   return 0;
 }
@@ -107,8 +112,10 @@ int resolve(const Flags& flags, bool resume) {
 
 void add_resolve(CLI::App& program, Session& session) {
   auto resume = std::make_shared<bool>(false);
-  auto* verb = add_verb(program, session, "resolve", "scene -> trajectories, with every cell resolved",
-                        takes_file | takes_set | takes_out | takes_threads | takes_seed, [&session, resume] { return resolve(session.flags, *resume); }, "scene.yaml");
+  auto* verb = add_verb(
+      program, session, "resolve", "scene -> trajectories, with every cell resolved",
+      takes_file | takes_set | takes_out | takes_threads | takes_seed,
+      [&session, resume] { return resolve(session.flags, *resume); }, "scene.yaml");
   verb->add_flag("--resume", *resume, "continue from the checkpoint in DIR if there is one");
 }
 

@@ -1,0 +1,103 @@
+/// \file --json: exactly one object on stdout with the contract's keys, whatever the verb and however it
+/// ends.
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "integration/program.hpp"
+
+namespace hemowalk::test {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* const campaign =
+    "format: hemowalk.campaign/1\n"
+    "trajectories: [{name: one, synthetic: {platelets: 20, duration: 600 ms}}]\n"
+    "calibrate: {t0: 100 ms, bootstrap: 50}\n"
+    "coarse: [{name: device, walkers: 1e4, dt: 1 s, end: 60 s}]\n"
+    "out: results\n";
+
+/// Parses stdout as a whole and checks its head; fails the test otherwise.
+Json object_of(const Outcome& outcome, const std::string& verb) {
+  const Json object = Json::parse(outcome.out, nullptr, false);
+  EXPECT_TRUE(object.is_object()) << verb << " printed:\n" << outcome.out << outcome.err;
+  if (!object.is_object()) return Json::object();
+  std::vector<std::string> first;
+  for (const auto& [key, value] : object.items())
+    if (first.size() < 5) first.push_back(key);
+  EXPECT_EQ(first, (std::vector<std::string>{"format", "version", "input_sha256", "seed", "warnings"}))
+      << verb;
+  EXPECT_EQ(object.value("format", ""), "hemowalk." + verb + "/1");
+  EXPECT_TRUE(object.contains("warnings") && object["warnings"].is_array()) << verb;
+  return object;
+}
+
+TEST(Json, EveryVerbPrintsOneObject) {
+  const Scratch scratch;
+  scratch.write("campaign.yaml", campaign);
+  scratch.write("device.yaml",
+                "format: hemowalk.coarse/1\nlaw: {D: 100 um2/s}\nwalkers: 1e4\ndt: 1 s\nend: 60 s\n");
+  const auto check = object_of(hemowalk(scratch, "check campaign.yaml --json"), "check");
+  EXPECT_EQ(check.value("kind", ""), "campaign");
+
+  const auto plan = object_of(hemowalk(scratch, "plan campaign.yaml --json"), "plan");
+  ASSERT_EQ(plan["runs"].size(), 1U);
+  for (const char* key : {"hash", "action", "reason", "estimate"})
+    EXPECT_TRUE(plan["runs"][0].contains(key)) << key;
+  EXPECT_EQ(plan["runs"][0]["action"], "new");
+
+  const auto run = object_of(hemowalk(scratch, "run campaign.yaml --json"), "run");
+  EXPECT_EQ(run["runs"], 1);
+  EXPECT_EQ(run["done"], 1);
+  EXPECT_EQ(run["cached"], 0);
+  EXPECT_EQ(object_of(hemowalk(scratch, "run campaign.yaml --json"), "run")["cached"], 1);
+
+  const auto status = object_of(hemowalk(scratch, "status campaign.yaml --json"), "status");
+  ASSERT_EQ(status["runs"].size(), 1U);
+  EXPECT_EQ(status["runs"][0]["state"], "done");
+  EXPECT_EQ(status["runs"][0]["hash"], plan["runs"][0]["hash"]);
+
+  object_of(hemowalk(scratch, "report results --json"), "report");
+
+  const std::string folder = "results/runs/" + plan["runs"][0]["hash"].get<std::string>();
+  const auto calibrate =
+      object_of(hemowalk(scratch, "calibrate " + folder + " --t0 100ms --bootstrap 50 --json"), "calibrate");
+  for (const char* key : {"n_platelets", "duration_s", "walls_y_m", "estimators", "profile", "kurtosis",
+                          "gate", "verdict", "law_file", "wall_s"})
+    EXPECT_TRUE(calibrate.contains(key)) << key;
+  EXPECT_TRUE(std::filesystem::exists(scratch.path() / calibrate["law_file"].get<std::string>()));
+
+  const auto walk = object_of(hemowalk(scratch, "coarse device.yaml --json"), "coarse");
+  for (const char* key : {"method", "reason", "time_s", "absorbed_fraction", "absorbed_sigma",
+                          "absorbed_law_sigma", "profile", "walkers", "walker_steps_per_s", "wall_s"})
+    EXPECT_TRUE(walk.contains(key)) << key;
+}
+
+TEST(Json, ErrorsAreObjectsToo) {
+  const Scratch scratch;
+  scratch.write("bad.yaml", "format: hemowalk.campaign/1\nreplica: 3\n");
+  const auto bad = hemowalk(scratch, "run bad.yaml --json");
+  EXPECT_EQ(bad.code, 2);
+  const auto object = object_of(bad, "run");
+  EXPECT_EQ(object["error"]["exit_code"], 2);
+  EXPECT_NE(object["error"]["message"].get<std::string>().find("bad.yaml:2:1"), std::string::npos);
+
+  const auto usage = hemowalk(scratch, "plan --nonsense --json");
+  EXPECT_EQ(usage.code, 2);
+  EXPECT_TRUE(Json::parse(usage.out, nullptr, false).is_object()) << usage.out;
+}
+
+TEST(Json, TheSeedOfTheCommandLineArrives) {
+  const Scratch scratch;
+  scratch.write("campaign.yaml", campaign);
+  const auto a = object_of(hemowalk(scratch, "plan campaign.yaml --json"), "plan"),
+             b = object_of(hemowalk(scratch, "plan campaign.yaml --seed 7 --json"), "plan");
+  EXPECT_EQ(b["seed"], 7);
+  EXPECT_EQ(b["runs"][0]["seed"], 7);
+  EXPECT_NE(a["runs"][0]["hash"], b["runs"][0]["hash"]);
+}
+
+}  // namespace
+}  // namespace hemowalk::test

@@ -1,0 +1,13 @@
+# The program as a user meets it. Runs of the program get one thread: these tests are about behaviour, not speed.
+if(TARGET hemowalk)
+  hemowalk_test(test_cli_json SOURCES integration/test_cli_json.cpp LINK hemowalk_workflow LABELS integration)
+  hemowalk_test(test_report SOURCES integration/test_report.cpp LINK hemowalk_workflow LABELS integration)
+  foreach(test test_cli_json test_report)
+    target_compile_definitions(${test} PRIVATE HEMOWALK_PROGRAM="$<TARGET_FILE:hemowalk>")
+    add_dependencies(${test} hemowalk)
+  endforeach()
+  foreach(test test_cli_bad_input test_cli_campaign test_cli_launcher)
+    add_test(NAME ${test} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/integration/${test}.sh $<TARGET_FILE:hemowalk>)
+    set_tests_properties(${test} PROPERTIES LABELS integration TIMEOUT 300)
+  endforeach()
+endif()
