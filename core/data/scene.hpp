@@ -142,9 +142,10 @@ struct Scene {
   Places place;
 
   std::string source_text;   ///< canonical YAML of this scene (comments and white space gone)
-  std::string input_sha256;  ///< of what decides the results: equal physics, equal hash (checkpoint intervals and
-                             ///< file names do not count, file contents do)
-  std::vector<std::string> warnings;  ///< keys that have no effect, as file:line:col: problem (why) suggestion
+  std::string input_sha256;  ///< of what decides the results: equal physics, equal hash (checkpoint intervals
+                             ///< and file names do not count, file contents do)
+  std::vector<std::string>
+      warnings;  ///< keys that have no effect, as file:line:col: problem (why) suggestion
 
   const Kind* find_kind(const std::string& name) const {
     for (const auto& k : cells.kinds)
