@@ -53,6 +53,7 @@ Tables<Real>::Tables(const CellType& type)
     mass_rate.push_back(real(m / (type.h() * type.h())));
   }
   total_metric = real(total);
+  stiff_volume = material.volume_modulus > 0.5 * total / vertices / (type.h() * type.h());
   for (int t = 0; t < type.rest().triangle_count(); ++t) {
     const auto& v = type.rest().triangles[t];
     const auto& r = type.triangle_rest()[t];
@@ -248,11 +249,10 @@ template <class Real>
   }
 }
 
-/// scratch.force <- N^{-1} scratch.force by two triangular sweeps, the three components and all lanes at
+/// x <- N^{-1} x by two triangular sweeps, the three components and all lanes at
 /// once.
 template <class Real>
-[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::solve() {
-  Real* x = s_.force.data();
+[[gnu::flatten, gnu::noinline]] void BatchKernel<Real>::solve(Real* x) {
   const int n = t_.vertices;
   for (int p = 0; p < n; ++p) {
     V sum = load3(x, t_.order[p]);
@@ -266,6 +266,24 @@ template <class Real>
       sum = sum - t_.column_value[i] * load3(x, t_.column_index[i]);
     store3(sum, x, t_.order[p]);
   }
+}
+
+/// With u = N^{-1} g and c = k_v/sum |g|^2: (N + c g g^T)^{-1} r = N^{-1} r - u c (u.r)/(1 + c g.u).
+template <class Real>
+[[gnu::flatten]] void BatchKernel<Real>::solve_with_volume() {
+  std::memcpy(s_.response.data(), s_.gradient.data(), sizeof(Real) * s_.response.size());
+  solve(s_.response.data());
+  P gu(0), ur(0);
+  for (int k = 0; k < t_.vertices; ++k) {
+    const V u = load3(s_.response.data(), k);
+    gu += dot(load3(s_.gradient.data(), k), u);
+    ur += dot(u, load3(s_.force.data(), k));
+  }
+  // scratch.gradient holds 6 g
+  const Real c = static_cast<Real>(t_.material.volume_modulus) / (36 * t_.rest_gradient_square);
+  const P factor = c * ur / (1 + c * gu);
+  solve(s_.force.data());
+  for (int k = 0; k < t_.vertices; ++k) add3(-factor * load3(s_.response.data(), k), s_.force.data(), k);
 }
 
 template <class Real>
@@ -384,7 +402,7 @@ auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions
   Report report{P(0), P(0), P(0)};
   for (int i = 0; i < options.iterations; ++i) {
     unbalance(b);
-    solve();
+    t_.stiff_volume ? solve_with_volume() : solve(s_.force.data());
     report.increment = correct(b);
   }
   if (options.measure_residual) {

@@ -54,6 +54,7 @@ struct Tables {
   std::vector<Real> lap_value;
   Real h, inverse_h, rest_volume, rest_gradient_square, epsilon2, total_metric;
   bool damped;
+  bool stiff_volume;  ///< k_v exceeds half the mean mass rate: N needs the volume term to converge
 };
 
 /// Scratch fields of one thread; sized once.
@@ -67,7 +68,7 @@ struct Scratch {
         curvature(size(vertices)),
         area(size(vertices)) {}
   static std::size_t size(int vertices) { return static_cast<std::size_t>(vertices) * mesh::lanes_of<Real>; }
-  Array<Real> moved, increment, force, gradient, curvature, area;
+  Array<Real> moved, increment, force, gradient, response, curvature, area;
 };
 
 /// Pointers to the fields of one batch.
@@ -126,7 +127,9 @@ class BatchKernel {
   /// scale.
   P unbalance(const BatchFields<Real>& b);
   void add_rayleigh();
-  void solve();
+  void solve(Real* x);
+  /// The same for N + (k_v/sum |g|^2) g g^T (Woodbury), where the volume term is too stiff for N alone.
+  void solve_with_volume();
   /// d += correction; \returns |correction|^2/|d|^2.
   P correct(const BatchFields<Real>& b);
   void damp_and_project(const BatchFields<Real>& b, bool damping);

@@ -85,7 +85,7 @@ StretchGradient<double> law_gradient(const Material& m, const Stretch<double>& s
     case Law::skalak:
       return Skalak<double>{m.Gs, m.skalak_C}.gradient(s);
   }
-  return {0, 0};
+  return {0, 0, 0};
 }
 
 void add_edge_forces(const CellType& type, const Field& x, Field& f) {

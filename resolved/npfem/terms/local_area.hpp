@@ -44,9 +44,10 @@ struct LocalArea {
 /// The same energy from the singular values, by Newton on log s1*; for the reference path.
 inline double local_area_energy(double C, double s1, double s2) {
   double u = 0.5 * std::log(s1 / s2);
-  for (int i = 0; i < 50; ++i) {
+  for (int i = 0; i < 100; ++i) {
     const double a = std::exp(u), b = 1 / a;
-    const double change = ((s2 - b) * b - (s1 - a) * a) / ((2 * a - s1) * a + (2 * b - s2) * b);
+    const double curvature = (2 * a - s1) * a + (2 * b - s2) * b;  // negative far from the minimum
+    const double change = std::clamp(((s2 - b) * b - (s1 - a) * a) / std::max(curvature, 0.1), -0.5, 0.5);
     u -= change;
     if (std::abs(change) < 1e-15) break;
   }
