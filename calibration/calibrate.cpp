@@ -7,11 +7,16 @@
 #include <limits>
 
 #include "calibration/calibration.hpp"
+#include "calibration/diffusivity.hpp"
+#include "calibration/gate.hpp"
+#include "calibration/holdout.hpp"
+#include "calibration/local_law.hpp"
 #include "calibration/msd.hpp"
 #include "calibration/resampling.hpp"
 #include "calibration/tracks.hpp"
 #include "core/check.hpp"
 #include "core/provenance.hpp"
+#include "core/statistics.hpp"
 
 namespace hemowalk::calibration {
 namespace {
@@ -47,6 +52,67 @@ data::TransportLaw::Conditions conditions_of(const std::vector<data::Trajectorie
   return c;
 }
 
+constexpr int profile_nodes = 65;
+constexpr std::size_t law_draws = 64;
+
+/// Tabulates the smooth local law wall to wall, with the spread of its draws.
+void set_profile(Calibration& c, const LocalFit& fit) {
+  auto& p = c.law.profile;
+  auto& s = c.smooth;
+  for (int k = 0; k < profile_nodes; ++k)
+    p.y.push_back(c.walls_y[0] + (c.walls_y[1] - c.walls_y[0]) * k / (profile_nodes - 1));
+  const auto tabulate = [&](const LocalLaw& law, std::vector<double>& D, std::vector<double>& v) {
+    for (double y : p.y) {
+      D.push_back(law.D(y));
+      v.push_back(law.v(y));
+    }
+  };
+  tabulate(fit.law, p.D, p.v);
+  std::vector<std::vector<double>> D(fit.draws.size()), v = D;
+  for (std::size_t b = 0; b < fit.draws.size(); ++b) tabulate(fit.draws[b], D[b], v[b]);
+  s.y = p.y;
+  s.D = p.D;
+  s.v = p.v;
+  s.density = fit.law.equilibrium(p.y);
+  for (std::size_t k = 0; k < p.y.size(); ++k) {
+    std::vector<double> d, w;
+    for (std::size_t b = 0; b < fit.draws.size(); ++b) {
+      d.push_back(D[b][k]);
+      w.push_back(v[b][k]);
+    }
+    // Half the 68 % interval: the draws of ln D are Gaussian, those of D are skewed where little is known.
+    s.sigma.push_back((quantile(d, 0.8413) - quantile(d, 0.1587)) / 2);
+    s.v_sigma.push_back((quantile(w, 0.8413) - quantile(w, 0.1587)) / 2);
+  }
+  D.resize(std::min(D.size(), law_draws));
+  v.resize(std::min(v.size(), law_draws));
+  p.D_draws = std::move(D);
+  p.v_draws = std::move(v);
+}
+
+/// Cell-free layer from the red cells' profile (unknown without one), and what happens near the walls.
+void set_walls(Calibration& c, const std::vector<data::Trajectories>& runs, const Ensemble& e,
+               const Layer& core) {
+  const Layer rich = rbc_rich_layer(runs, e.t0);
+  const bool known = rich.high > rich.low;
+  c.law.cell_free_layer =
+      known ? (rich.low - e.walls[0] + e.walls[1] - rich.high) / 2 : std::numeric_limits<double>::quiet_NaN();
+  // Without red cells: 4 um below the box's floor and ceiling, the thickness of a cell-free layer at 35 %.
+  const double outside = (e.height - (e.walls[1] - e.walls[0])) / 2;
+  c.residence =
+      residence(e, core, known ? std::max(c.law.cell_free_layer, 1e-6) : 4e-6 - std::max(0.0, outside));
+}
+
+void set_steps(Calibration& c, const Ensemble& e, const Layer& core, const Lags& lags) {
+  const HalfFits halves = fit_halves(e, lags.plateau);
+  c.holdout = hold_out(e, core, halves);
+  const StepSelection steps = select_step_law(e, core, halves, lags.memory.memory);
+  c.step_choices = steps.choices;
+  c.step_reason = steps.law.kind + ": " + steps.reason;
+  c.law.step_law = steps.law;
+  c.law.valid.dt_min = steps.dt_min;
+}
+
 }  // namespace
 
 Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options& options) {
@@ -65,25 +131,28 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   c.walls_y = ensemble.walls;
   c.core = {core.low, core.high};
 
-  c.estimators.push_back(
-      estimate_ratio("paper", ensemble, resampling, single_origin_slope(ensemble, paper), 0.5));
-  c.estimators.push_back(
-      estimate_ratio("paper_all", ensemble, resampling, single_origin_slope(ensemble, all), 0.5));
-  const double lag = options.lag.value_or(ensemble.shear_rate > 0 ? 2 / ensemble.shear_rate : 20e-3);
-  const LagSums plateau = lag_sums(ensemble, core, ensemble.steps(lag));
-  c.estimators.push_back(estimate_ratio("plateau", ensemble, resampling, plateau.msd(), 0.5 / plateau.lag));
-  c.estimators.back().lag = plateau.lag;
+  const Lags lags = choose_lags(ensemble, core, options);
+  const LocalFit local = fit_local_law(ensemble, lags.plateau, resampling, options.bootstrap);
+  c.estimators = estimators(ensemble, core, paper, lags, resampling, local);
 
   for (const auto& [layer, name] : {std::pair{all, "all"}, std::pair{core, "core"}}) {
     c.msd.push_back(single_origin_curve(ensemble, layer, name));
-    c.msd.push_back(time_averaged_curve(ensemble, layer, name, {plateau.lag, 5 * plateau.lag}));
+    c.msd.push_back(time_averaged_curve(ensemble, layer, name, {lags.low, lags.high}));
   }
-  c.profile = kramers_moyal(binned_moments(ensemble, plateau.steps, profile_bins(ensemble)), resampling);
+  c.profile = kramers_moyal(binned_moments(ensemble, ensemble.steps(lags.plateau), profile_bins(ensemble)),
+                            resampling);
   c.kurtosis = kurtosis_of(ensemble, core);
 
-  const Estimate& best = *c.find("plateau");
+  const auto [best, reason] = recommend(c.estimators, lags);
+  c.core_estimator = best.name;
+  c.core_reason = reason;
   c.law.conditions = conditions_of(runs, ensemble);
   c.law.core = {best.D, best.sigma, best.lag, c.core};
+  c.law.memory = lags.memory.memory;
+  c.law.gate = artefact_gate(runs, ensemble);
+  set_profile(c, local);
+  set_walls(c, runs, ensemble, core);
+  set_steps(c, ensemble, core, lags);
   for (const auto& r : runs) c.law.provenance.inputs_sha256.push_back(r.input_sha256);
   c.law.provenance.version = version();
   c.law.provenance.seed = options.seed;

@@ -58,14 +58,40 @@ struct Calibration {
   double duration = 0;               ///< s
   std::array<double, 2> walls_y{};   ///< m
   std::array<double, 2> core{};      ///< m, layer in which the displacements of `plateau` start
-  std::vector<Estimate> estimators;  ///< paper, paper_all, plateau, gls, green_kubo
+  std::vector<Estimate> estimators;  ///< paper, paper_all, plateau, gls, green_kubo, confined, without_jumps
+  std::string core_estimator, core_reason;  ///< which of them went into law.core, and why
   std::vector<MsdCurve> msd;
   struct Profile {
     std::vector<double> y, D, sigma, v, v_sigma, density;  ///< m, m2/s, m2/s, m/s (without D'), 1/m
-  } profile;  ///< Kramers-Moyal at the plateau lag; the smooth fit is in law.profile
+  } profile;                                               ///< Kramers-Moyal at the plateau lag
+  Profile smooth;  ///< maximum-likelihood fit through the walker's propagator; density = its equilibrium
   struct Kurtosis {
     std::vector<double> lag, excess;
   } kurtosis;
+  /// The walk fed with the law of one half of the cells, against the other half.
+  struct Holdout {
+    std::vector<double> lag, msd_ratio, msd_sigma;  ///< s; observed/predicted MSD of the core and its error
+    std::vector<double> histogram_p;        ///< p-value of the displacements' histogram (PIT, 10 bins)
+    double profile_lag = 0, profile_p = 0;  ///< s; p-value of the profile after the whole window
+  } holdout;
+  /// Hold-out log-likelihood of the step laws at one lag, nats per step relative to the Gaussian.
+  struct StepChoice {
+    double lag = 0;  ///< s
+    double persistent_gain = 0, persistent_sigma = 0;
+    double heavy_tail_gain = 0, heavy_tail_sigma = 0;
+    double correlation = 0, tail_exponent = 0;  ///< of successive steps; Student's degrees of freedom
+    std::string best;
+  };
+  std::vector<StepChoice> step_choices;
+  std::string step_reason;  ///< why law.step_law is what it is
+  /// Cells near the walls. They leave when they reach the core layer.
+  struct Residence {
+    double zone = 0;                     ///< m, thickness of the near-wall zones
+    int near_at_t0 = 0, left_of_t0 = 0;  ///< cells in a zone at t0, and how many of them leave
+    int visits = 0, left = 0;            ///< all stays after t0
+    double mean_time = 0,
+           mean_time_sigma = 0;  ///< s, time in the zone per departure (stays cut off are counted in)
+  } residence;
   std::vector<Verdict> verdict;
   data::TransportLaw law;  ///< carries the gate's findings
   std::vector<std::string> warnings;

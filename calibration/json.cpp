@@ -51,6 +51,24 @@ Json curves(const std::vector<MsdCurve>& all) {
   return a;
 }
 
+Json profile(const Calibration::Profile& p) {
+  return {{"y_m", numbers(p.y)},           {"D_m2_per_s", numbers(p.D)},
+          {"sigma", numbers(p.sigma)},     {"v_m_per_s", numbers(p.v)},
+          {"v_sigma", numbers(p.v_sigma)}, {"density_1_per_m", numbers(p.density)}};
+}
+
+Json step_choices(const std::vector<Calibration::StepChoice>& all) {
+  Json a = Json::array();
+  for (const auto& s : all)
+    a.push_back({{"lag_s", number(s.lag)},
+                 {"best", s.best},
+                 {"persistent_gain_nats", number(s.persistent_gain)},
+                 {"persistent_sigma", number(s.persistent_sigma)},
+                 {"heavy_tail_gain_nats", number(s.heavy_tail_gain)},
+                 {"heavy_tail_sigma", number(s.heavy_tail_sigma)}});
+  return a;
+}
+
 Json gate(const data::TransportLaw::Gate& g) {
   Json findings = Json::array();
   for (const auto& f : g.findings)
@@ -100,22 +118,37 @@ std::string to_json(const Calibration& c) {
   j["walls_y_m"] = numbers(c.walls_y);
   j["core_y_m"] = numbers(c.core);
   j["estimators"] = estimators(c.estimators);
-  j["profile"] = {{"y_m", numbers(c.profile.y)},           {"D_m2_per_s", numbers(c.profile.D)},
-                  {"sigma", numbers(c.profile.sigma)},     {"v_m_per_s", numbers(c.profile.v)},
-                  {"v_sigma", numbers(c.profile.v_sigma)}, {"density_1_per_m", numbers(c.profile.density)}};
+  j["profile"] = profile(c.profile);
+  j["profile_smooth"] = profile(c.smooth);
   j["kurtosis"] = {{"lag_s", numbers(c.kurtosis.lag)}, {"excess", numbers(c.kurtosis.excess)}};
   j["msd"] = curves(c.msd);
   j["gate"] = gate(law.gate);
   j["verdict"] = verdicts(c.verdict);
+  j["holdout"] = {{"lag_s", numbers(c.holdout.lag)},
+                  {"msd_ratio", numbers(c.holdout.msd_ratio)},
+                  {"msd_sigma", numbers(c.holdout.msd_sigma)},
+                  {"histogram_p", numbers(c.holdout.histogram_p)},
+                  {"profile_lag_s", number(c.holdout.profile_lag)},
+                  {"profile_p", number(c.holdout.profile_p)}};
+  j["step_choices"] = step_choices(c.step_choices);
+  j["residence"] = {{"zone_m", number(c.residence.zone)},
+                    {"near_at_t0", c.residence.near_at_t0},
+                    {"left_of_t0", c.residence.left_of_t0},
+                    {"visits", c.residence.visits},
+                    {"left", c.residence.left},
+                    {"mean_time_s", number(c.residence.mean_time)},
+                    {"mean_time_sigma", number(c.residence.mean_time_sigma)}};
   j["law"] = {{"core_D_m2_per_s", number(law.core.D)},
               {"core_sigma", number(law.core.D_sigma)},
-              {"y_m", numbers(law.profile.y)},
-              {"D_m2_per_s", numbers(law.profile.D)},
-              {"v_m_per_s", numbers(law.profile.v)},
+              {"core_estimator", c.core_estimator},
+              {"core_reason", c.core_reason},
               {"memory_s", number(law.memory)},
               {"step_law", law.step_law.kind},
+              {"step_reason", c.step_reason},
+              {"dt_min_s", number(law.valid.dt_min)},
               {"cell_free_layer_m", number(law.cell_free_layer)},
-              {"shear_exponent", number(law.scaling.shear_exponent)}};
+              {"shear_exponent", number(law.scaling.shear_exponent)},
+              {"shear_exponent_sigma", number(law.scaling.sigma)}};
   j["law_file"] = c.law_file.empty() ? Json(nullptr) : Json(c.law_file);
   j["wall_s"] = number(c.wall);
   return j.dump(2);

@@ -18,7 +18,7 @@ LagSums lag_sums(const Ensemble& e, const Layer& layer, int steps) {
   s.second.resize(n);
   s.fourth.resize(n);
   const auto k = static_cast<std::size_t>(steps);
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (n * e.runs.front().time.size() > worth_threads)
   for (std::size_t p = 0; p < n; ++p) {
     const double* y = e.paths[p].y.data();
     double count = 0, m1 = 0, m2 = 0, m4 = 0;
@@ -255,7 +255,7 @@ Calibration::Profile kramers_moyal(const BinnedMoments& m, const Resampling& res
   p.D = best.D;
   p.v = best.v;
   std::vector<std::vector<double>> D(bins, std::vector<double>(draws)), v = D;
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (draws * bins * cells > worth_threads)
   for (int k = 0; k < resampling.draws(); ++k) {
     const std::uint16_t* w = resampling[k];
     const LocalMoments draw = local_moments(m, enough, [&](const std::vector<double>& x) {

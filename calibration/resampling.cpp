@@ -11,7 +11,7 @@ namespace hemowalk::calibration {
 
 Resampling::Resampling(const Ensemble& ensemble, int draws, std::uint64_t seed)
     : draws_(draws), cells_(ensemble.paths.size()), weight_(static_cast<std::size_t>(draws) * cells_, 0) {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (weight_.size() > worth_threads)
   for (int b = 0; b < draws; ++b) {
     std::uint16_t* w = &weight_[static_cast<std::size_t>(b) * cells_];
     RandomSequence random(seed, Stream::bootstrap, static_cast<std::uint64_t>(b));
@@ -118,7 +118,7 @@ Estimate estimate_ratio(const std::string& name, const Ensemble& ensemble, const
   }
   e.D = scale * ratio.value();
   std::vector<double> draws(static_cast<std::size_t>(resampling.draws()));
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(static) if (draws.size() * resampling.cells() > worth_threads)
   for (int b = 0; b < resampling.draws(); ++b)
     draws[static_cast<std::size_t>(b)] = scale * ratio.value(resampling[b]);
   std::vector<double> per_run, per_run_sigma;

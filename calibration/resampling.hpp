@@ -10,6 +10,9 @@
 
 namespace hemowalk::calibration {
 
+/// Loops with less work (multiply-adds, roughly) run on one thread: waking the others costs more.
+inline constexpr std::size_t worth_threads = 2'000'000;
+
 /// Weights [draw][cell]: how often each cell was drawn, stratified by run (each run keeps its number of
 /// cells). Counter-based: a draw depends on (seed, draw) only, not on threads.
 class Resampling {

@@ -1,0 +1,135 @@
+/// calibrate() on synthetic trajectories with a known answer: D within its error, D(y) near the walls,
+/// memory, step law, hold-out. Seeds are fixed; limits are 3.5 standard errors (two-sided p = 5e-4) unless
+/// said otherwise.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calibration/calibration.hpp"
+#include "calibration/synthetic.hpp"
+
+namespace {
+
+using namespace hemowalk;
+using namespace hemowalk::calibration;
+
+Calibration calibrate_one(const Synthetic& s, Options o = {}) {
+  o.bootstrap = 300;
+  return calibrate({generate(s)}, o);
+}
+double z(const Estimate& e, double truth) { return (e.D - truth) / e.sigma; }
+constexpr double limit = 3.5;
+
+TEST(Recovery, ReflectingSlab) {
+  Synthetic s;
+  s.platelets = 400;
+  const Calibration c = calibrate_one(s);
+  for (const char* name : {"plateau", "gls", "green_kubo", "confined", "local", "without_jumps"}) {
+    EXPECT_LT(std::abs(z(*c.find(name), s.D)), limit) << name;
+    EXPECT_LT(c.find(name)->sigma, 0.05 * s.D) << name;
+  }
+  EXPECT_EQ(c.law.memory, 0);
+  EXPECT_EQ(c.law.step_law.kind, "gaussian");
+  EXPECT_LE(c.law.valid.dt_min, 2e-3);
+  EXPECT_NEAR(c.law.core.D, s.D, limit * c.law.core.D_sigma);
+}
+
+TEST(Recovery, NarrowSlabNeedsTheWallCorrection) {
+  Synthetic s;
+  s.platelets = 1500;
+  s.gap = 10e-6;
+  const Calibration c = calibrate_one(s);
+  EXPECT_LT(z(*c.find("plateau"), s.D), -limit);  // the walls hold it back
+  EXPECT_LT(std::abs(z(*c.find("confined"), s.D)), limit);
+  EXPECT_LT(std::abs(z(*c.find("local"), s.D)), limit);
+  EXPECT_EQ(c.core_estimator, "local");
+}
+
+TEST(Recovery, LocalDWallToWall) {
+  Synthetic s;
+  s.platelets = 600;
+  s.D_contrast = 0.5;
+  const Calibration c = calibrate_one(s);
+  EXPECT_LT(std::abs(z(*c.find("local"), true_layer_D(s, 10e-6, 40e-6))), limit);
+  double chi = 0;
+  for (std::size_t k = 0; k < c.smooth.y.size(); k += 8) {
+    const double score = (c.smooth.D[k] - true_D(s, c.smooth.y[k])) / c.smooth.sigma[k];
+    chi += score * score;
+    EXPECT_LT(std::abs(score), 4) << c.smooth.y[k];
+    EXPECT_LT(c.smooth.sigma[k], 0.15 * c.smooth.D[k]) << c.smooth.y[k];
+    EXPECT_LT(std::abs(c.smooth.v[k]), 4 * c.smooth.v_sigma[k] + 1e-7) << c.smooth.y[k];  // uniform: no drift
+  }
+  EXPECT_LT(chi, 30);  // 9 heights, 8 um apart: chi-squared with 9 degrees of freedom, p = 4e-4
+  EXPECT_FALSE(c.law.profile.D_draws.empty());
+}
+
+TEST(Recovery, MemoryIsFoundAndTakenIntoAccount) {
+  Synthetic s;
+  s.platelets = 400;
+  s.memory = 10e-3;
+  const Calibration c = calibrate_one(s);
+  EXPECT_NEAR(c.law.memory, s.memory, 1e-3);
+  EXPECT_EQ(c.core_estimator, "memory");
+  EXPECT_LT(std::abs(z(*c.find("memory"), s.D)), limit);
+  EXPECT_LT(std::abs(z(*c.find("green_kubo"), s.D)), limit);
+  ASSERT_FALSE(c.step_choices.empty());
+  EXPECT_EQ(c.step_choices.front().best, "persistent");
+}
+
+TEST(Recovery, JumpsAreCountedAndCanBeRemoved) {
+  Synthetic s;
+  s.platelets = 400;
+  s.jump_fraction = 0.0035;
+  s.jump_size = 3e-6;
+  const Calibration c = calibrate_one(s);
+  EXPECT_LT(std::abs(z(*c.find("plateau"), s.D + jump_D(s))), limit);
+  // Jumps below the threshold stay: 7 % of their variance, 1 % of D.
+  EXPECT_NEAR(c.find("without_jumps")->D, 1.011 * s.D, limit * c.find("without_jumps")->sigma);
+  EXPECT_FALSE(c.law.gate.passed);
+  EXPECT_EQ(c.step_choices.front().best, "heavy_tail");
+}
+
+TEST(Recovery, UnseenCellsAreAsPredicted) {
+  Synthetic s;
+  s.platelets = 200;
+  s.D_contrast = 0.3;
+  const Calibration c = calibrate_one(s);
+  ASSERT_GE(c.holdout.lag.size(), 3u);
+  for (std::size_t k = 0; k < c.holdout.lag.size(); ++k) {
+    EXPECT_NEAR(c.holdout.msd_ratio[k], 1, limit * c.holdout.msd_sigma[k]) << c.holdout.lag[k];
+    EXPECT_GT(c.holdout.histogram_p[k], 5e-4) << c.holdout.lag[k];
+  }
+  EXPECT_GT(c.holdout.profile_p, 5e-4);
+}
+
+// The same test must see a law that is wrong: D measured with 1-ms jumps added to one half of the tracks
+// only.
+TEST(Recovery, HoldOutSeesAWrongLaw) {
+  Synthetic slow, fast;
+  slow.platelets = fast.platelets = 100;
+  fast.D = 3e-10;
+  fast.seed = 2;
+  data::Trajectories t = generate(slow);
+  const data::Trajectories f = generate(fast);
+  auto& p = t.kinds["platelet"].position;
+  for (std::size_t k = 0; k < t.time.size(); ++k)
+    for (std::size_t n = 1; n < 100; n += 2)
+      for (std::size_t a = 0; a < 3; ++a)
+        p[(k * 100 + n) * 3 + a] = f.kinds.at("platelet").position[(k * 100 + n) * 3 + a];
+  Options o;
+  o.bootstrap = 50;
+  const Calibration c = calibrate({t}, o);
+  EXPECT_LT(c.holdout.histogram_p[0],
+            5e-4);  // half the cells move three times as far as the law of the others says
+}
+
+TEST(Recovery, ReproducibleBitByBit) {
+  Synthetic s;
+  s.platelets = 30;
+  Calibration a = calibrate_one(s), b = calibrate_one(s);
+  a.wall = b.wall = 0;
+  EXPECT_EQ(to_json(a), to_json(b));
+}
+
+}  // namespace
