@@ -287,8 +287,9 @@ void Fluid<Real>::moments(View<Node4<Real>> velocity) const {
   }
 }
 
-/// With moments, row (j - 1, k - 1) follows row (j, k): the rows it gathers from are then all collided and
-/// still in cache. The first and last plane of a slab wait for the neighbour threads.
+/// With moments, plane k - 1 follows plane k: the planes it gathers from are then collided and still in
+/// cache. (Row by row, or in strips of rows that fit the second-level cache, is slower: it breaks the
+/// streams.) The first and last plane of a slab wait for the neighbour threads.
 template <class Real>
 template <bool with_moments>
 void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
