@@ -65,6 +65,7 @@ struct Scratch {
         increment(3 * size(vertices)),
         force(3 * size(vertices)),
         gradient(3 * size(vertices)),
+        response(3 * size(vertices)),
         curvature(size(vertices)),
         area(size(vertices)) {}
   static std::size_t size(int vertices) { return static_cast<std::size_t>(vertices) * mesh::lanes_of<Real>; }
