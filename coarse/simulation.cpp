@@ -141,7 +141,7 @@ void walk(const Case& c, const SlabLaw& law, const WalkSettings& settings,
           const std::vector<std::int64_t>& steps, const RunOptions& options, Result& result) {
   Walkers walkers(c, law, settings);
   double walking = 0;
-  const std::int64_t stride = std::max<std::int64_t>(steps.back() / 100, 1);
+  const std::int64_t stride = std::max<std::int64_t>(steps.back() / 100, 512);
   for (const std::int64_t step : steps) {
     const auto leg_start = Clock::now();
     while (walkers.step() < step) {
@@ -174,6 +174,13 @@ Result run(const Case& c, const data::TransportLaw& given, const RunOptions& opt
   const auto start = Clock::now();
   require(c.initial.empty() || c.initial == "uniform",
           "initial: `" + c.initial + "` is not known (walkers start uniformly) use uniform");
+  const auto keeps = [](const Face& f) {
+    return f.type == Face::Type::reflect || f.type == Face::Type::periodic;
+  };
+  require(
+      !options.track_flow_direction || (keeps(c.bottom) && keeps(c.top)),
+      "the way along the flow was asked for beside a face that takes walkers (its mean would mix those still "
+      "walking with those that stopped) use reflecting or periodic faces");
   data::TransportLaw law = given;
   if (c.constant_D) {
     law = data::TransportLaw::constant(*c.constant_D);

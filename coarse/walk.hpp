@@ -164,13 +164,14 @@ template <class L>
 template <class L>
 struct Release {
   typename L::Int y, code;
+  typename L::Real memory;  ///< a fresh velocity, away from the face
 };
 
 /// Place and code of walkers whose residence ends within \p step: they diffuse for the rest of it from the
-/// face, and may be taken up again at once. \p n is a standard normal number of this step.
+/// face, and may be taken up again at once.
 template <class L>
 [[gnu::noinline]] Release<L> leave_trap(const WalkModel& m, int side, typename L::Bits offset,
-                                        typename L::Real n, std::uint64_t first_id, std::int64_t step) {
+                                        std::uint64_t first_id, std::int64_t step) {
   using std::abs;
   using std::max;
   using std::sqrt;
@@ -178,16 +179,21 @@ template <class L>
   using Int = typename L::Int;
   const Wall& wall = side == 0 ? m.bottom : m.top;
   const Words<L> random = lane_bits<L>(m.seed, Stream::coarse_wall, first_id, offset, step);
+  // a second block of the same stream: steps are below 2^29, so bit 40 is free
+  const Words<L> more =
+      lane_bits<L>(m.seed, Stream::coarse_wall, first_id, offset, step | (std::int64_t{1} << 40));
+  const NormalPair<L> normal(more.word[0], more.word[1]);
   // time of release within the step: exponential, given that it falls into the step
   const float within = -std::expm1(-1 / wall.residence);
   const Real kept = Real(1) - Real(within) * uniform<L>(random.word[0]);
   const Real released = Real(0.5f * wall.residence) * minus_two_log<L>(kept * Real(4294967296.0f));
   const Real rest = max(Real(1) - released, Real(1e-6f));
-  const Real s = Real(wall.variance) * rest, x = abs(n) * sqrt(s);
+  const Real s = Real(wall.variance) * rest, x = abs(normal.cosine) * sqrt(normal.square * s);
   const Real u = uniform<L>(random.word[1]);
   const auto again = flag_of(u < uptake_probability<L>(Real(0), x, s, Real(wall.uptake) * rest));
+  const Real speed = abs(normal.sine) * sqrt(normal.square);
   return {side == 0 ? to_int(x) : Int(top_position) - to_int(x),
-          select(again, taken_code<L>(wall, side, step, random.word[2]), Int(0))};
+          select(again, taken_code<L>(wall, side, step, random.word[2]), Int(0)), side == 0 ? speed : -speed};
 }
 
 /// Moves the walkers by \p scatter + \p drift and lets the faces act.
@@ -196,7 +202,6 @@ HEMO_INLINE void move(const WalkModel& m, LaneState<L>& w, const typename L::Rea
                       const typename L::Real& drift, const typename L::Real& s, std::uint64_t first_id,
                       std::int64_t step) {
   using std::abs;
-  using std::sqrt;
   using Real = typename L::Real;
   using Int = typename L::Int;
   const Int top(top_position);
@@ -222,9 +227,10 @@ HEMO_INLINE void move(const WalkModel& m, LaneState<L>& w, const typename L::Rea
     if ((side == 0 ? m.bottom : m.top).type != Face::Type::trap) continue;
     const auto leaving = w.code == Int(static_cast<std::int32_t>(-(state::trapped_first + side) - 2 * step));
     if (!any(leaving)) continue;
-    const Release<L> free = leave_trap<L>(m, side, w.offset, scatter / sqrt(s), first_id, step);
+    const Release<L> free = leave_trap<L>(m, side, w.offset, first_id, step);
     w.y = select(leaving, free.y, w.y);
     w.code = select(leaving, free.code, w.code);
+    if constexpr (S == StepLaw::persistent) w.memory = select(leaving, free.memory, w.memory);
   }
 }
 

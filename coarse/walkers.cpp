@@ -183,7 +183,7 @@ template <StepLaw S>
 void Walkers::walk_leg(std::int64_t begin, std::int64_t end) {
   const bool takes = model_.bottom.active() || model_.top.active();
   std::int64_t walked = 0;
-#pragma omp parallel for schedule(dynamic, 1) reduction(+ : walked)
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : walked) if (blocks() > 1)
   for (std::int64_t b = 0; b < blocks(); ++b) {
     walked += active_[b] * (end - begin);
     if (!table_)
@@ -218,7 +218,7 @@ void Walkers::advance_to(std::int64_t step) {
 Walkers::Counts Walkers::count(int bins) const {
   Counts total;
   total.histogram.assign(bins, 0);
-#pragma omp parallel
+#pragma omp parallel if (blocks() > 64)
   {
     Counts mine;
     mine.histogram.assign(bins, 0);
