@@ -44,9 +44,12 @@ Fluid<Real>::Fluid(const Block& block, const Parameters& parameters)
   if (stride_ / line % 8 == 0) stride_ += line;
   rows_.resize((ny + 2) * (nz + 2));
   for (std::size_t k = 0; k < nz + 2; ++k)
-    for (std::size_t j = 0; j < ny + 2; ++j)
-      rows_[k * (ny + 2) + j] = (k + nz - 1) % nz * directions * stride_ + (j + ny - 1) % ny * pitch_;
-  f_ = Array<Real>(nz * directions * stride_);
+    for (std::size_t j = 0; j < ny + 2; ++j) {
+      const bool foreign = parameters.divided_z && (k == 0 || k == nz + 1);
+      const std::size_t plane = foreign ? nz + k / (nz + 1) : (k + nz - 1) % nz;
+      rows_[k * (ny + 2) + j] = plane * directions * stride_ + (j + ny - 1) % ny * pitch_;
+    }
+  f_ = Array<Real>((parameters.divided_z ? nz + 2 : nz) * directions * stride_);
   wall_sum_.resize(2 * nz);
   set_wall_terms();
 }
@@ -305,7 +308,7 @@ void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity
     if constexpr (with_moments) {
 #pragma omp barrier
       for (int k = my.begin; k < my.end; k += std::max(1, my.end - 1 - my.begin))
-        for (int j = 0; j < ny; ++j) moments_row(j, k, !swapped_, velocity);
+        for (int j = 0; j < ny && !border_plane(k); ++j) moments_row(j, k, !swapped_, velocity);
     }
   }
   swapped_ = !swapped_;
@@ -314,12 +317,29 @@ void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity
 
 template <class Real>
 void Fluid<Real>::collide_and_stream(View<const Node4<Real>> force) {
+  contract(!parameters_.divided_z, "a divided fluid takes its steps by begin_advance and end_advance");
   step<false>(force, {});
 }
 
 template <class Real>
 void Fluid<Real>::advance(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+  contract(!parameters_.divided_z, "a divided fluid takes its steps by begin_advance and end_advance");
   step<true>(force, velocity);
+}
+
+template <class Real>
+void Fluid<Real>::begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+  step<true>(force, velocity);
+}
+
+template <class Real>
+void Fluid<Real>::end_advance(View<Node4<Real>> velocity) {
+  if (!parameters_.divided_z) return;
+#pragma omp parallel for schedule(static) num_threads(threads())
+  for (int j = 0; j < block_.ny; ++j) {
+    moments_row(j, 0, swapped_, velocity);
+    if (block_.nz > 1) moments_row(j, block_.nz - 1, swapped_, velocity);
+  }
 }
 
 template class Fluid<float>;

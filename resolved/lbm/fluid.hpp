@@ -36,7 +36,12 @@ struct Parameters {
   bool walls_y = true;  ///< bounce-back walls at y = 0 and y = ny, else periodic y
   Vec3 lower_wall_velocity{}, upper_wall_velocity{};  ///< the y component must be 0
   Vec3 body_force{};                                  ///< per node and step, in addition to the force field
+  bool divided_z =
+      false;  ///< the planes k = -1 and nz belong to other blocks (begin_advance), else periodic z
 };
+
+/// The two ends of a block along z.
+enum class Side { low, high };
 
 /// Density and velocity asked of a point (lattice coordinates) when a flow is initialised.
 struct FlowPoint {
@@ -85,7 +90,8 @@ class Fluid {
 
   /// Declares the nodes where \p solid(i, j, k) is true static solid: half-way bounce-back on every link that
   /// enters them, zero velocity and no force inside. Call before initialise(). Packs of nodes that touch the
-  /// solid run without SIMD.
+  /// solid run without SIMD. Periodic images are asked by their interior indices; a divided block also asks
+  /// for the halo planes k < 0 and k >= nz of its neighbours.
   void set_solid(const std::function<bool(int, int, int)>& solid);
   bool is_solid(int i, int j, int k) const { return !solid_.empty() && solid_[block_.at(i, j, k)]; }
   std::size_t fluid_nodes() const { return fluid_nodes_; }
@@ -109,6 +115,22 @@ class Fluid {
 
   /// collide_and_stream(force), then moments(velocity), in one sweep over memory; same result bit for bit.
   void advance(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+
+  // A domain divided along z into blocks (divided_z), of one process or many, takes a step in three parts:
+  //     begin_advance(force, velocity);
+  //     send_border(side, buffer) -> the neighbour's receive_border(its other side, buffer), both sides
+  //     end_advance(velocity);
+  // and gives, bit for bit, what the undivided block gives. Five of 19 populations cross a border.
+  /// Collides all planes and takes the moments of all but the first and the last.
+  void begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+  /// Numbers of one message.
+  std::size_t border_size() const { return 5 * static_cast<std::size_t>(block_.ny) * block_.nx; }
+  void send_border(Side side, View<Real> message) const;
+  void receive_border(Side side, View<const Real> message);
+  /// After load() of a divided block: exchange borders once before moments() and the first step?
+  bool border_missing() const { return parameters_.divided_z && swapped_; }
+  /// Moments of the first and last plane.
+  void end_advance(View<Node4<Real>> velocity);
 
   WallImpulse wall_impulse() const;
   Totals totals() const;
@@ -150,6 +172,7 @@ class Fluid {
   void moments_row(int j, int k, bool swapped, View<Node4<Real>> velocity) const;
   void fill_ghosts(int j, int k);
   void return_ghosts(int j, int k, const RowPointers<Real>& pointers);
+  bool border_plane(int k) const { return parameters_.divided_z && (k == 0 || k == block_.nz - 1); }
   template <bool with_moments>
   void step(View<const Node4<Real>> force, View<Node4<Real>> velocity);
 
@@ -162,7 +185,7 @@ class Fluid {
   // Plane k is [direction][j][x]: 19 long streams, which the hardware prefetchers follow (19 short ones, rows
   // of [direction][x], ran at half the speed). Rows are padded to a multiple of 16 with room for x = nx and,
   // at the end of the row before, x = -1. rows_ maps j in [-1, ny], k in [-1, nz] to the row's first element
-  // in direction 0: periodic images now, rows received from other ranks where the domain is divided.
+  // in direction 0: periodic images, or planes of their own for other blocks' borders.
   std::size_t pitch_ = 0, stride_ = 0;  ///< elements from row to row, from direction to direction
   std::vector<std::size_t> rows_;
   Array<Real> f_;

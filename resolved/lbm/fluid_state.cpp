@@ -29,8 +29,8 @@ void Fluid<Real>::set_solid(const std::function<bool(int, int, int)>& solid) {
     for (int j = -halo; j < ny + halo; ++j) {
       if (below(j) || above(j)) continue;
       for (int i = -halo; i < nx + halo; ++i)
-        solid_[block_.at(i, j, k)] =
-            solid((i + halo * nx) % nx, (j + halo * ny) % ny, (k + halo * nz) % nz) ? 1 : 0;
+        solid_[block_.at(i, j, k)] = solid((i + halo * nx) % nx, (j + halo * ny) % ny,
+                                           parameters_.divided_z ? k : (k + halo * nz) % nz);
     }
   kind_.assign(block_.interior(), bulk_node);
   mixed_.assign(static_cast<std::size_t>(ny) * nz, 0);
