@@ -32,6 +32,74 @@ std::array<double, 3>& operator+=(std::array<double, 3>& a, const std::array<dou
   return a;
 }
 
+/// Area vector N = (x1 - x0) x (x2 - x0) of a triangle and its rate, added to the three corners.
+/// [vertex][3][lane]
+template <int lanes, class Real>
+HEMO_INLINE void add_normals(const std::array<int, 3>& t, const Real* x, const Real* v, Real* sum,
+                             Real* rate) {
+  const Real *x0 = x + 3 * t[0] * lanes, *x1 = x + 3 * t[1] * lanes, *x2 = x + 3 * t[2] * lanes;
+  const Real *v0 = v + 3 * t[0] * lanes, *v1 = v + 3 * t[1] * lanes, *v2 = v + 3 * t[2] * lanes;
+  for (int d = 0; d < 3; ++d) {
+    const int p = (d + 1) % 3 * lanes, q = (d + 2) % 3 * lanes;
+    alignas(64) Real N[lanes], dN[lanes];
+#pragma omp simd
+    for (int l = 0; l < lanes; ++l) {
+      const Real ap = x1[p + l] - x0[p + l], aq = x1[q + l] - x0[q + l], bp = x2[p + l] - x0[p + l],
+                 bq = x2[q + l] - x0[q + l];
+      N[l] = ap * bq - aq * bp;
+      dN[l] = (v1[p + l] - v0[p + l]) * bq + ap * (v2[q + l] - v0[q + l]) - (v1[q + l] - v0[q + l]) * bp -
+              aq * (v2[p + l] - v0[p + l]);
+    }
+    for (int i = 0; i < 3; ++i) {
+      Real *s = sum + (3 * t[i] + d) * lanes, *r = rate + (3 * t[i] + d) * lanes;
+#pragma omp simd
+      for (int l = 0; l < lanes; ++l) s[l] += N[l], r[l] += dN[l];
+    }
+  }
+}
+
+/// From the sum S of area vectors round a vertex and its rate: rate <- delta dn/dt, sum <- delta J_t/|S|.
+template <int lanes, class Real>
+HEMO_INLINE void to_unit_normal(Real delta, const Node4<Real>* J, Real* sum, Real* rate) {
+#pragma omp simd
+  for (int l = 0; l < lanes; ++l) {
+    const Real s[3] = {sum[l], sum[lanes + l], sum[2 * lanes + l]},
+               r[3] = {rate[l], rate[lanes + l], rate[2 * lanes + l]};
+    const Real inverse =
+        1 / std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + std::numeric_limits<Real>::min());
+    const Real n[3] = {s[0] * inverse, s[1] * inverse, s[2] * inverse}, j[3] = {J[l].x, J[l].y, J[l].z};
+    const Real nr = n[0] * r[0] + n[1] * r[1] + n[2] * r[2], nj = n[0] * j[0] + n[1] * j[1] + n[2] * j[2];
+    for (int d = 0; d < 3; ++d) {
+      rate[d * lanes + l] = delta * inverse * (r[d] - nr * n[d]);
+      sum[d * lanes + l] = delta * inverse * (j[d] - nj * n[d]);
+    }
+  }
+}
+
+/// Forces of the couples on the corners: the gradient of g . N, g the sum over corners, is g x (opposite
+/// edge).
+template <int lanes, class Real>
+HEMO_INLINE void add_couples(const std::array<int, 3>& t, const Real* x, const Real* g, Real* force) {
+  alignas(64) Real sum[3][lanes];
+  for (int d = 0; d < 3; ++d) {
+    const Real *g0 = g + (3 * t[0] + d) * lanes, *g1 = g + (3 * t[1] + d) * lanes,
+               *g2 = g + (3 * t[2] + d) * lanes;
+#pragma omp simd
+    for (int l = 0; l < lanes; ++l) sum[d][l] = g0[l] + g1[l] + g2[l];
+  }
+  for (int i = 0; i < 3; ++i) {
+    const Real *from = x + 3 * t[(i + 1) % 3] * lanes, *to = x + 3 * t[(i + 2) % 3] * lanes;
+    for (int d = 0; d < 3; ++d) {
+      const int p = (d + 1) % 3, q = (d + 2) % 3;
+      Real* f = force + (3 * t[i] + d) * lanes;
+#pragma omp simd
+      for (int l = 0; l < lanes; ++l)
+        f[l] += sum[p][l] * (to[q * lanes + l] - from[q * lanes + l]) -
+                sum[q][l] * (to[p * lanes + l] - from[p * lanes + l]);
+    }
+  }
+}
+
 }  // namespace
 
 template <class Real>
@@ -75,20 +143,8 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
       return npfem::Membranes<Real>(
           std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
     };
-    std::vector<std::array<double, 3>> share;
-    for (const auto& t : rest.triangles) {
-      const mesh::TriangleMesh one{{rest.vertices[t[0]], rest.vertices[t[1]], rest.vertices[t[2]]},
-                                   {{0, 1, 2}}};
-      const double third = mesh::area(one) / 3;
-      share.push_back({third / area[t[0]], third / area[t[1]], third / area[t[2]]});
-    }
-    Group<Real> group{make(),
-                      kind,
-                      static_cast<std::int32_t>(bodies_),
-                      static_cast<std::uint32_t>(slots_),
-                      mass,
-                      weight,
-                      std::move(share)};
+    Group<Real> group{make(), kind,  static_cast<std::int32_t>(bodies_), static_cast<std::uint32_t>(slots_),
+                      mass,   weight};
     for (std::size_t c = 0; c < cells.size(); ++c) {
       if (cells[c].kind != kind) continue;
       std::visit(
@@ -139,6 +195,14 @@ void Simulation<Real>::build_coupling() {
   vertices_ = Array<Node4<Real>>(slots_), sites_ = Array<Node4<Real>>(slots_);
   reading_ = Array<Node4<Real>>(slots_), impulse_ = Array<Node4<Real>>(slots_),
   contact_force_ = Array<Node4<Real>>(slots_);
+  normal_rate_ = Array<Real>(3 * slots_), couple_force_ = Array<Real>(3 * slots_);
+  for (const auto& group : groups_)
+    std::visit(
+        [&](const auto& g) {
+          scratch_stride_ = std::max<std::size_t>(scratch_stride_, 3 * g.vertices() * g.lanes);
+        },
+        group.cells);
+  scratch_ = Array<Real>(scratch_stride_ * omp_get_max_threads());
   if (!one_theta_) force_reading_ = Array<Node4<Real>>(slots_);
   add_loads();
 }
@@ -251,11 +315,13 @@ void Simulation<Real>::read_positions() {
         group.cells);
 }
 
-/// The fluid receives J at the retracted point x - delta n, so the body must lose it there too, or every
-/// tangential traction would twist it by delta n x J. The couple of each triangle, q x n with q = -delta J,
-/// is applied as normal forces n (q . grad phi_i) on its corners: no net force, the right torque.
+/// Retraction as a change of coordinates (docs/adr/0007): the coupling point x_s = x - delta n(x) is a
+/// function of the vertices, so its velocity is v - delta dn/dt, and a force J at x_s acts on the vertices as
+/// J and, through -delta (dn/dx)^T, as forces on the corners of the triangles around. Virtual work and both
+/// momenta are then conserved, and a rigid rotation of fluid and cell together feels no force. dn/dt and J
+/// are those of the last step.
 template <class Real>
-void Simulation<Real>::add_retraction_couples() {
+void Simulation<Real>::retract() {
   const Real delta = static_cast<Real>(scene_.coupling.retraction);
   if (delta == 0) return;
   for (auto& group : groups_)
@@ -263,41 +329,24 @@ void Simulation<Real>::add_retraction_couples() {
         [&](const auto& g) {
           constexpr int lanes = std::decay_t<decltype(g)>::lanes;
           const auto& triangles = g.rest().triangles;
+          const int vertices = g.vertices();
+          const std::size_t length = static_cast<std::size_t>(vertices) * 3 * lanes;
 #pragma omp parallel for schedule(static)
           for (int b = 0; b < g.batches(); ++b) {
-            const std::size_t slot = group.first_marker + static_cast<std::size_t>(b) * g.vertices() * lanes;
-            const Node4<Real>*x = vertices_.data() + slot, *J = impulse_.data() + slot;
-            Node4<Real>* F = contact_force_.data() + slot;
-            for (std::size_t t = 0; t < triangles.size(); ++t) {
-              const auto& corner = triangles[t];
-              const auto& share = group.triangle_share[t];
-              for (int l = 0; l < lanes; ++l) {
-                const Node4<Real>&p0 = x[corner[0] * lanes + l], &p1 = x[corner[1] * lanes + l],
-                      &p2 = x[corner[2] * lanes + l];
-                const Real e0[3] = {p2.x - p1.x, p2.y - p1.y, p2.z - p1.z},
-                           e1[3] = {p0.x - p2.x, p0.y - p2.y, p0.z - p2.z};
-                const Real N[3] = {e0[1] * e1[2] - e0[2] * e1[1], e0[2] * e1[0] - e0[0] * e1[2],
-                                   e0[0] * e1[1] - e0[1] * e1[0]};
-                const Real square = N[0] * N[0] + N[1] * N[1] + N[2] * N[2];
-                const Real scale = -delta / (square * std::sqrt(square) + std::numeric_limits<Real>::min());
-                Real q[3] = {0, 0, 0};
-                for (int i = 0; i < 3; ++i) {
-                  const Node4<Real>& j = J[corner[i] * lanes + l];
-                  const Real s = scale * static_cast<Real>(share[i]);
-                  q[0] += s * j.x, q[1] += s * j.y, q[2] += s * j.z;
-                }
-                // q . (N x e) = e . (q x N)
-                const Real c[3] = {q[1] * N[2] - q[2] * N[1], q[2] * N[0] - q[0] * N[2],
-                                   q[0] * N[1] - q[1] * N[0]};
-                const Real f0 = c[0] * e0[0] + c[1] * e0[1] + c[2] * e0[2],
-                           f1 = c[0] * e1[0] + c[1] * e1[1] + c[2] * e1[2];
-                const Real f[3] = {f0, f1, -f0 - f1};
-                for (int i = 0; i < 3; ++i) {
-                  Node4<Real>& to = F[corner[i] * lanes + l];
-                  to.x += f[i] * N[0], to.y += f[i] * N[1], to.z += f[i] * N[2];
-                }
-              }
-            }
+            const Real *x = g.offsets().data + b * length, *v = g.velocities().data + b * length;
+            Real* rate = normal_rate_.data() + 3 * static_cast<std::size_t>(group.first_marker) + b * length;
+            Real* force =
+                couple_force_.data() + 3 * static_cast<std::size_t>(group.first_marker) + b * length;
+            Real* sum = scratch_.data() + static_cast<std::size_t>(omp_get_thread_num()) * scratch_stride_;
+            std::fill(rate, rate + length, Real(0));
+            std::fill(force, force + length, Real(0));
+            std::fill(sum, sum + length, Real(0));
+            for (const auto& t : triangles) add_normals<lanes>(t, x, v, sum, rate);
+            const Node4<Real>* J =
+                impulse_.data() + group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
+            for (int k = 0; k < vertices; ++k)
+              to_unit_normal<lanes>(delta, J + k * lanes, sum + 3 * k * lanes, rate + 3 * k * lanes);
+            for (const auto& t : triangles) add_couples<lanes>(t, x, sum, force);
           }
         },
         group.cells);
@@ -344,9 +393,11 @@ void Simulation<Real>::predict() {
                                           normals[vector + 2 * lanes + l]};
                   correct(read, half, J, inverse_a, normal, w);
                 }
-                for (int d = 0; d < 3; ++d) w[d] += g[d];
+                const std::size_t at = 3 * static_cast<std::size_t>(group.first_marker) + vector + l;
+                for (int d = 0; d < 3; ++d) w[d] += g[d] + normal_rate_[at + d * lanes];
                 u = {w[0], w[1], w[2], Real(0)};
-                const Real force[3] = {F.x, F.y, F.z};
+                const Real force[3] = {F.x + couple_force_[at], F.y + couple_force_[at + lanes],
+                                       F.z + couple_force_[at + 2 * lanes]};
                 for (int d = 0; d < 3; ++d)
                   predicted[vector + d * lanes + l] =
                       (m * velocities[vector + d * lanes + l] + h * (a * w[d] + force[d])) * inverse_metric;
@@ -433,7 +484,7 @@ void Simulation<Real>::step() {
     }
     {
       Stopwatch watch(timings_.solid);
-      add_retraction_couples();
+      retract();
       predict();
       move_cells();
       impulses();
@@ -494,7 +545,7 @@ Momentum Simulation<Real>::momentum() const {
 template <class Real>
 double Simulation<Real>::slip_rms() {
   if (bodies_ == 0) return 0;
-  // u = u* + F/2 at the present points; velocity_ holds u* + theta/2 F.
+  // Of the coupling points against u = u* + F/2 there; velocity_ holds u* + theta/2 F.
   Array<Node4<Real>> u(slots_), f(slots_);
   markers_->interpolate(velocity_.view(), u.view());
   Array<Node4<Real>> field(force_.size());
@@ -515,7 +566,10 @@ double Simulation<Real>::slip_rms() {
               const auto m = group.marker(c, k);
               const double uk[3] = {u[m].x + rest * f[m].x, u[m].y + rest * f[m].y, u[m].z + rest * f[m].z};
               for (int d = 0; d < 3; ++d) {
-                const double slip = v[layout.at(c, k, d)] - uk[d] - gravity[d];
+                const double site =
+                    v[layout.at(c, k, d)] -
+                    normal_rate_[3 * static_cast<std::size_t>(group.first_marker) + layout.at(c, k, d)];
+                const double slip = site - uk[d] - gravity[d];
                 sum += slip * slip;
               }
             }

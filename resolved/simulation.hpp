@@ -37,7 +37,6 @@ struct Group {
   std::uint32_t first_marker = 0;  ///< of vertex k of cell c: first_marker + layout().at(c, k)
   std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid
   std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx
-  std::vector<std::array<double, 3>> triangle_share;  ///< [T] part of each corner's area in this triangle
 
   int count() const {
     return std::visit([](const auto& g) { return g.count(); }, cells);
@@ -109,7 +108,7 @@ class Simulation {
   void build_coupling();
   void start_flow();
   void read_positions();
-  void add_retraction_couples();
+  void retract();
   void predict();
   void move_cells();
   void impulses();
@@ -134,6 +133,9 @@ class Simulation {
   Array<Node4<Real>> vertices_, sites_;         ///< [slot] relative to origin: membrane, retracted
   Array<Node4<Real>> reading_, force_reading_;  ///< [slot] I[.]; after predict(): w
   Array<Node4<Real>> impulse_, contact_force_;  ///< [slot]
+  Array<Real> normal_rate_, couple_force_;  ///< [slot / lanes][3][lane]: delta dn/dt, forces of the couples
+  Array<Real> scratch_;                     ///< [thread][scratch_stride_]
+  std::size_t scratch_stride_ = 0;
   struct PointLoad {
     std::uint32_t slot;
     std::array<double, 3> force;

@@ -49,7 +49,7 @@ struct Coupling {
   enum class Kernel { phi2, phi3, phi4 } kernel = Kernel::phi4;
   int cycles = 1;
   int solid_every = 1;                    ///< fluid steps per solid step
-  double retraction = 0.7;                ///< delta, in dx (method: thickness of a smeared sheet)
+  double retraction = 0.6;                ///< delta, in dx (method: thickness of a smeared sheet)
   double theta_n = 0.97, theta_t = 0.97;  ///< slip correction, normal and tangential
   double chi = 8.0 / 3.0;
   std::optional<double> velocity_cap;  ///< lattice units
