@@ -13,7 +13,7 @@ namespace hemowalk::npfem {
 template <class S>
 struct LocalArea {
   S C;
-  /// Enough for round-off at area strains within [-0.5, 1.5]; every lane does the same number.
+  /// Enough for round-off at area strains within [-0.3, 0.6]; every lane does the same number.
   static constexpr int newton_steps = sizeof(S) == 4 ? 2 : 4;
 
   template <class T>
@@ -21,12 +21,13 @@ struct LocalArea {
     using std::max;
     using std::min;
     const T bound(0.9f), t2 = s.t * s.t;  // beyond |l| = 1 the nearest point is no longer unique
-    const T per_I1 = 1 / s.I1, first = (s.J - 1) * per_I1;
-    T l = max(min(first + (s.J + 2) * per_I1 * (first * first), bound), -bound);  // second order in J - 1
+    const T excess = s.J - 1;
+    T l = excess * s.I1 / (s.I1 * s.I1 - (s.J + 2) * excess);  // Halley's first step: right to second order
+    l = max(min(l, bound), -bound);
     for (int i = 0; i < newton_steps; ++i) {
       const T plus = 1 + l, both = 1 - l * l;
       // J (1+l)^2 - (1-l^2)^2 - l t^2, arranged so that the small difference J - 1 is formed first
-      const T phi = (s.J - 1) * (plus * plus) + l * (2 + 3 * l - l * l * l - t2);
+      const T phi = excess * (plus * plus) + l * (2 + 3 * l - l * l * l - t2);
       const T slope = 2 * (s.J * plus) + 4 * (l * both) - t2;
       l = max(min(l - phi / slope, bound), -bound);
     }

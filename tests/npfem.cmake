@@ -1,0 +1,8 @@
+if(NOT TARGET hemowalk_npfem OR NOT TARGET hemowalk_rigid)
+  return()
+endif()
+
+hemowalk_test(test_mesh
+  SOURCES unit/test_mesh_shapes.cpp unit/test_mesh_file.cpp unit/test_mesh_observables.cpp
+  LINK hemowalk_mesh LABELS unit)
+hemowalk_test(test_npfem_terms SOURCES unit/test_npfem_terms.cpp LINK hemowalk_npfem LABELS unit)
