@@ -14,6 +14,8 @@
 #include "calibration/msd.hpp"
 #include "calibration/resampling.hpp"
 #include "calibration/tracks.hpp"
+#include "calibration/trends.hpp"
+#include "calibration/verdict.hpp"
 #include "core/check.hpp"
 #include "core/provenance.hpp"
 #include "core/statistics.hpp"
@@ -113,6 +115,57 @@ void set_steps(Calibration& c, const Ensemble& e, const Layer& core, const Lags&
   c.law.valid.dt_min = steps.dt_min;
 }
 
+/// How D follows shear and hematocrit, and where the law may be used.
+void set_validity(Calibration& c, const Ensemble& e, const Layer& core, const LocalFit& fit) {
+  const ShearExponent n = shear_exponent(e, core, fit);
+  c.law.scaling.shear_exponent = n.n;
+  c.law.scaling.sigma = n.sigma;
+  c.shear_note = n.note;
+  // A single condition vouches for itself and its neighbourhood: a factor 2 in shear, 0.05 in hematocrit.
+  if (e.shear_rate > 0) {
+    const double low = n.measured ? std::min(n.low, e.shear_rate) : e.shear_rate;
+    const double high = n.measured ? std::max(n.high, e.shear_rate) : e.shear_rate;
+    c.law.valid.shear_rate = {low / 2, high * 2};
+  }
+  const double h = c.law.conditions.hematocrit;
+  if (std::isfinite(h)) c.law.valid.hematocrit = {std::max(0.0, h - 0.05), std::min(1.0, h + 0.05)};
+}
+
+void set_verdict(Calibration& c, const data::Trajectories& first) {
+  Ours ours;
+  ours.particle = c.kind;
+  ours.D = c.law.core.D;
+  ours.sigma = c.law.core.D_sigma;
+  ours.shear_rate = c.law.conditions.shear_rate;
+  ours.hematocrit = c.law.conditions.hematocrit;
+  ours.gate_passed = c.law.gate.passed;
+  ours.imported = first.version == "import";
+  c.verdict = compare_with_literature(ours, read_literature(literature_text));
+}
+
+/// What a reader of the number must know.
+void set_warnings(Calibration& c, const data::Trajectories& first) {
+  if (!c.law.gate.passed) {
+    std::string names;
+    for (const auto& f : c.law.gate.findings)
+      if (!f.passed) names += (names.empty() ? "" : ", ") + f.name;
+    c.warnings.push_back("ARTEFACT GATE FAILED (" + names +
+                         "): D below is not fit to be used as a property of blood");
+  }
+  if (c.n_runs < 3)
+    c.warnings.push_back("errors are over the cells of " + std::to_string(c.n_runs) +
+                         " packing(s) only: cells of one box share its flow; run at least 3");
+  if (!std::isfinite(first.kappa_damping) || !std::isfinite(first.t_c))
+    c.warnings.push_back(
+        "damping or shape-recovery time of the red cells not stated: D cannot be tied to them");
+  const Estimate *line = c.find("gls"), *gk = c.find("green_kubo");
+  for (const Estimate* other : {line, gk})
+    if (std::abs(other->D - c.law.core.D) > 3 * std::hypot(other->sigma, c.law.core.D_sigma))
+      c.warnings.push_back(other->name + " disagrees with the core value by more than three standard errors");
+  if (c.law.core.D_sigma > 0.25 * c.law.core.D)
+    c.warnings.push_back("the error of D exceeds 25 %: more platelet-seconds are needed (plan)");
+}
+
 }  // namespace
 
 Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options& options) {
@@ -144,6 +197,11 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   c.kurtosis = kurtosis_of(ensemble, core);
 
   const auto [best, reason] = recommend(c.estimators, lags);
+  require(best.D > 0 && std::isfinite(best.sigma), [&] {
+    return "no D in the core layer " + std::to_string(core.low * 1e6) + " .. " +
+           std::to_string(core.high * 1e6) +
+           " um (fewer than two cells with displacements start there) widen the layer or add cells";
+  });
   c.core_estimator = best.name;
   c.core_reason = reason;
   c.law.conditions = conditions_of(runs, ensemble);
@@ -153,6 +211,9 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   set_profile(c, local);
   set_walls(c, runs, ensemble, core);
   set_steps(c, ensemble, core, lags);
+  set_validity(c, ensemble, core, local);
+  set_verdict(c, runs.front());
+  set_warnings(c, runs.front());
   for (const auto& r : runs) c.law.provenance.inputs_sha256.push_back(r.input_sha256);
   c.law.provenance.version = version();
   c.law.provenance.seed = options.seed;

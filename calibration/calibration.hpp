@@ -92,6 +92,7 @@ struct Calibration {
     double mean_time = 0,
            mean_time_sigma = 0;  ///< s, time in the zone per departure (stays cut off are counted in)
   } residence;
+  std::string shear_note;  ///< where law.scaling comes from
   std::vector<Verdict> verdict;
   data::TransportLaw law;  ///< carries the gate's findings
   std::vector<std::string> warnings;
@@ -111,6 +112,47 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
 
 /// Reads a folder of `iT, x, y, z` text files (um, one per platelet) as published by Kotsalos et al. 2020.
 data::Trajectories import_text_folder(const std::string& folder);
+
+/// One condition's effect on ln D.
+struct Trend {
+  std::string name;                   ///< "ln shear rate", "hematocrit", "ln kappa/(1-kappa)", ...
+  double coefficient = 0, sigma = 0;  ///< change of ln D per unit of it
+  bool claimed = false;               ///< beyond two standard errors
+  std::string statement;              ///< in words: the effect, or "not distinguishable"
+};
+/// D over conditions: ln D linear in what varies between the calibrations, weighted by their errors.
+struct ConditionFit {
+  double D_centre = 0;  ///< m2/s, at the mean conditions
+  std::vector<Trend> trends;
+  std::vector<std::string> left_out;          ///< what could not be told apart, and why
+  std::vector<std::array<double, 2>> scaled;  ///< D/(gamma r^2) and its error per calibration, r = 4 um
+  double chi_squared = 0;
+  int degrees_of_freedom = 0;
+  data::TransportLaw::Valid valid;  ///< range that the calibrations span
+};
+/// A trend is claimed only beyond two standard errors; scatter beyond the stated errors widens them.
+/// \throws InputError for fewer than two calibrations or one without an error.
+ConditionFit fit_conditions(const std::vector<data::TransportLaw>& laws);
+
+/// What a planned error costs.
+struct PlanInput {
+  double shear_rate = 100;                       ///< 1/s
+  double lag = 0;                                ///< s; 0 = 2/shear rate
+  double share_in_layer = 0.6;                   ///< of the platelets that start in the core
+  double run_time = 1, t0 = 0.3;                 ///< s
+  int platelets = 95;                            ///< per run
+  const data::TransportLaw* measured = nullptr;  ///< an earlier calibration, with the data it had:
+  double platelet_seconds = 0;                   ///< s
+};
+struct Plan {
+  double relative_error = 0;
+  double platelet_seconds = 0;      ///< s after t0, all runs together
+  int runs = 3;                     ///< never below 3: platelets of one box share its flow
+  int platelets_single_origin = 0;  ///< what the single-origin line needs instead, whatever the run length
+  std::string note;
+};
+/// \throws InputError for an error outside (0, 1) or no time scale.
+Plan plan_for(double relative_error, const PlanInput& input);
 
 /// The calibrate --json object of docs/reference.md as text.
 std::string to_json(const Calibration& result);

@@ -148,7 +148,8 @@ std::string to_json(const Calibration& c) {
               {"dt_min_s", number(law.valid.dt_min)},
               {"cell_free_layer_m", number(law.cell_free_layer)},
               {"shear_exponent", number(law.scaling.shear_exponent)},
-              {"shear_exponent_sigma", number(law.scaling.sigma)}};
+              {"shear_exponent_sigma", number(law.scaling.sigma)},
+              {"shear_note", c.shear_note}};
   j["law_file"] = c.law_file.empty() ? Json(nullptr) : Json(c.law_file);
   j["wall_s"] = number(c.wall);
   return j.dump(2);
