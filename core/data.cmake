@@ -22,7 +22,8 @@ hemowalk_library(hemowalk_data
     io.cpp log.cpp progress.cpp provenance.cpp statistics.cpp units.cpp
     data/scene.cpp data/scene_checks.cpp data/scene_format.cpp data/scene_write.cpp data/trajectories.cpp data/transport_law.cpp
     hdf5.cpp
-    yaml/canonical.cpp yaml/describe.cpp yaml/document.cpp yaml/overrides.cpp yaml/schema.cpp yaml/validate.cpp
+    yaml/canonical.cpp yaml/describe.cpp yaml/document.cpp yaml/overrides.cpp yaml/scalars.cpp yaml/schema.cpp yaml/text.cpp
+    yaml/validate.cpp
   LINK
     hemowalk_core GSL::gsl GSL::gslcblas yaml-cpp nlohmann_json::nlohmann_json spdlog::spdlog fmt::fmt
     PkgConfig::hemowalk_hdf5 OpenSSL::Crypto ${UDUNITS2_LIBRARY})

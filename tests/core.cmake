@@ -11,6 +11,7 @@ hemowalk_library(test_campaign_format
   SOURCES ${CMAKE_SOURCE_DIR}/coarse/case.cpp ${CMAKE_SOURCE_DIR}/workflow/campaign.cpp
           ${CMAKE_SOURCE_DIR}/workflow/campaign_format.cpp ${CMAKE_SOURCE_DIR}/workflow/reference.cpp
   LINK hemowalk_data)
+target_compile_options(test_campaign_format PRIVATE -Wno-restrict)  # as in core/data.cmake
 hemowalk_test(test_schema_scene SOURCES integration/test_schema_scene.cpp LINK hemowalk_data LABELS integration)
 foreach(name campaign fuzz)
   hemowalk_test(test_schema_${name} SOURCES integration/test_schema_${name}.cpp LINK test_campaign_format LABELS integration)

@@ -1,6 +1,7 @@
 /// \file The table of scene.yaml. Words of choices stand in the order of the enumerators in scene.hpp.
 
 #include "core/data/formats.hpp"
+#include "core/units.hpp"
 
 namespace hemowalk::data {
 namespace {
@@ -69,6 +70,7 @@ Field fluid() {
 Field coupling() {
   const std::vector<std::string> ours{"conservative", "peskin"}, paper{"paper"};
   const Field every = integer().at_least(1).at_most(1000), shift = number().at_least(0).at_most(2);
+  const Coupling usual;  // numbers found by calibration stand in one place, the struct
   const Field cap = any_of({choice({"off"}), number().above(0).at_most(0.5)});
   return map_of({
       with_default("scheme", choice({"conservative", "paper", "peskin"}), "conservative",
@@ -77,13 +79,16 @@ Field coupling() {
       with_default("cycles", integer().at_least(1).at_most(100), "1", "multi-direct-forcing cycles"),
       with_default("solid_every", every, "1", "fluid steps per solid step").when("scheme", ours),
       with_default("solid_every", every, "2", "fluid steps per solid step").when("scheme", paper),
-      with_default("retraction", shift, "0.7", "distance of the coupling surface inside the membrane, in dx")
+      with_default("retraction", shift, format_number(usual.retraction),
+                   "distance of the coupling surface inside the membrane, in dx")
           .when("scheme", ours),
       with_default("retraction", shift, "0", "distance of the coupling surface inside the membrane, in dx")
           .when("scheme", paper),
-      with_default("theta", list_of(number().at_least(0).at_most(1), 2, 2), "[0.97, 0.97]",
+      with_default("theta", list_of(number().at_least(0).at_most(1), 2, 2),
+                   "[" + format_number(usual.theta_n) + ", " + format_number(usual.theta_t) + "]",
                    "slip correction, normal and tangential"),
-      with_default("chi", number().above(0).at_most(100), "2.6666666666666665", "coupling mass, in rho A dx"),
+      with_default("chi", number().above(0).at_most(100), format_number(usual.chi),
+                   "coupling mass, in rho A dx"),
       with_default("velocity_cap", cap, "off", "largest velocity handed to a vertex, lattice units")
           .when("scheme", ours),
       with_default("velocity_cap", cap, "0.03", "largest velocity handed to a vertex, lattice units")

@@ -36,11 +36,23 @@ void add_bounds(Json& json, const Field& field) {
 
 Json schema_of(const Field& field);
 
+/// Whether other keys of the map depend on the word at \p name.
+bool decides(const Field& map, const std::string& name) {
+  for (const Key& k : map.keys)
+    for (const Key::Condition& c : k.conditions)
+      if (c.sibling == name) return true;
+  return false;
+}
+
 Json object_of(const Field& field) {
   Json json = {{"type", "object"}, {"properties", Json::object()}, {"additionalProperties", false}};
   Json required = Json::array();
   for (const Key& k : field.keys) {
     Json one = schema_of(k.field);
+    if (decides(field, k.name))  // may also be written {word: {keys}}
+      one = Json{
+          {"anyOf",
+           {one, {{"type", "object"}, {"propertyNames", one}, {"minProperties", 1}, {"maxProperties", 1}}}}};
     one["description"] = k.doc;
     if (k.presence == Key::Presence::required && k.conditions.empty() && field.type == Field::Type::map)
       required.push_back(k.name);
@@ -58,9 +70,6 @@ Json object_of(const Field& field) {
   if (field.type == Field::Type::tagged) json["minProperties"] = json["maxProperties"] = 1;
   return json;
 }
-
-/// A choice that decides about its siblings may also be written {word: {keys}}.
-Json choice_of(const Field& field) { return {{"enum", field.words}}; }
 
 Json schema_of(const Field& field) {
   Json json;
@@ -89,7 +98,7 @@ Json schema_of(const Field& field) {
       json = {{"type", "string"}, {"minLength", 1}};
       break;
     case Field::Type::choice:
-      json = choice_of(field);
+      json = {{"enum", field.words}};
       break;
     case Field::Type::list:
       json = {{"type", "array"}, {"items", schema_of(field.parts[0])}};

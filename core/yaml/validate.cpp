@@ -1,34 +1,18 @@
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
-#include "core/units.hpp"
+#include "core/yaml/scalars.hpp"
 #include "core/yaml/schema.hpp"
 
 namespace hemowalk::yaml {
 namespace {
 
-std::string shortened(const std::string& text) {
-  return text.size() > 60 ? text.substr(0, 57) + "..." : text;
-}
-
-std::string quoted(const std::string& text) { return "`" + shortened(text) + "`"; }
-
 std::string joined(const std::vector<std::string>& words, const char* separator) {
   std::string text;
   for (const std::string& w : words) text += (text.empty() ? "" : separator) + w;
   return text;
-}
-
-bool looks_like_number(const std::string& text) {
-  if (text.empty()) return false;
-  const char c = text[0];
-  const char d = text.size() > 1 ? text[1] : ' ';
-  const auto digit = [](char x) { return x >= '0' && x <= '9'; };
-  return digit(c) || ((c == '-' || c == '+' || c == '.') && (digit(d) || d == '.'));
 }
 
 /// Whether \p node has the outer form of \p field: chooses among the parts of any_of.
@@ -129,15 +113,11 @@ class Validator {
     switch (field.type) {
       case Field::Type::number:
       case Field::Type::unit:
-        return number(node, field, path);
       case Field::Type::integer:
-        return integer(node, field, path);
       case Field::Type::boolean:
-        return boolean(node, field, path);
       case Field::Type::text:
-        return text(node, field, path);
       case Field::Type::choice:
-        return choice(node, field, path);
+        return scalar(node, field, path);
       case Field::Type::list:
         return list(node, field, path);
       case Field::Type::map:
@@ -156,100 +136,16 @@ class Validator {
     return {};
   }
 
-  bool in_range(const Node& node, const Field& field, double x, const std::string& path) {
-    const bool low = field.low_open ? x > field.low : x >= field.low;
-    const bool high = field.high_open ? x < field.high : x <= field.high;
-    if (low && high) return true;
-    report(node, path,
-           quoted(node.text) + " is out of range (expected: " + describe(field) +
-               ") choose a value in the range");
-    return false;
-  }
-
-  Value number(const Node& node, const Field& field, const std::string& path) {
-    if (!node.is_scalar()) return wrong_form(node, field, path);
-    Value result;
+  Value scalar(const Node& node, const Field& field, const std::string& path) {
+    if (!node.is_scalar() || node.text.empty() ||
+        (field.type == Field::Type::choice && !has_form_of(node, field)))
+      return wrong_form(node, field, path);
     try {
-      const bool unit_alone = field.type == Field::Type::unit && !looks_like_number(node.text);
-      result.real = unit_alone ? unit_factor(node.text, field.unit)
-                               : parse_quantity(node.text, field.unit, field.usual);
+      return read_scalar(node.text, field);
     } catch (const InputError& error) {
-      report(node, path, shortened_message(error.what()));
+      report(node, path, error.what());
       return {};
     }
-    if (!in_range(node, field, result.real, path)) return {};
-    result.type = Value::Type::number;
-    result.unit = field.unit == "1" ? "" : field.unit;
-    return result;
-  }
-  static std::string shortened_message(const std::string& text) {
-    if (text.size() <= 300) return text;
-    const auto why = text.rfind(" (");
-    return why == std::string::npos ? text.substr(0, 300) : text.substr(0, 60) + "...`" + text.substr(why);
-  }
-
-  Value integer(const Node& node, const Field& field, const std::string& path) {
-    if (!node.is_scalar()) return wrong_form(node, field, path);
-    const auto x = parse_number(node.text);
-    if (!x) {
-      report(node, path, shortened_message(why_no_number(node.text)));
-      return {};
-    }
-    Value result;
-    // Long integers do not survive a double: read digits as they stand, 1e6 through the double.
-    const char* end = node.text.data() + node.text.size();
-    const auto parsed = std::from_chars(node.text.data(), end, result.whole);
-    if (parsed.ec != std::errc{} || parsed.ptr != end) {
-      if (*x != std::floor(*x) || std::abs(*x) > 9007199254740992.0) {
-        report(node, path,
-               quoted(node.text) + " is not a whole number (" + describe(field) +
-                   " is expected) write it without a fraction");
-        return {};
-      }
-      result.whole = static_cast<std::int64_t>(*x);
-    }
-    if (!in_range(node, field, *x, path)) return {};
-    result.type = Value::Type::integer;
-    return result;
-  }
-
-  Value boolean(const Node& node, const Field& field, const std::string& path) {
-    if (!node.is_scalar()) return wrong_form(node, field, path);
-    if (node.text != "true" && node.text != "false") {
-      std::string lower;
-      for (const char c : node.text) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      const bool yes = lower == "yes" || lower == "on" || lower == "y" || lower == "1" || lower == "true";
-      const bool no = lower == "no" || lower == "off" || lower == "n" || lower == "0" || lower == "false";
-      report(node, path,
-             quoted(node.text) +
-                 " is not a truth value (some readers take it as one, others as text) write " +
-                 (yes  ? "true"
-                  : no ? "false"
-                       : "true or false"));
-      return {};
-    }
-    Value result;
-    result.type = Value::Type::boolean;
-    result.flag = node.text == "true";
-    return result;
-  }
-
-  Value text(const Node& node, const Field& field, const std::string& path) {
-    if (!node.is_scalar() || node.text.empty()) return wrong_form(node, field, path);
-    Value result;
-    result.type = Value::Type::text;
-    result.word = node.text;
-    return result;
-  }
-
-  Value choice(const Node& node, const Field& field, const std::string& path) {
-    const auto word = std::find(field.words.begin(), field.words.end(), node.text);
-    if (!node.is_scalar() || word == field.words.end()) return wrong_form(node, field, path);
-    Value result;
-    result.type = Value::Type::text;
-    result.word = node.text;
-    result.index = static_cast<std::size_t>(word - field.words.begin());
-    return result;
   }
 
   Value list(const Node& node, const Field& field, const std::string& path) {
@@ -353,7 +249,7 @@ class Validator {
       if (!decides || !chosen || !chosen->is_map() || chosen->members.size() != 1) continue;
       const Member pair = chosen->members[0];
       if (!pair.value.is_map() && pair.value.type != Node::Type::null) continue;
-      Node word = scalar(pair.key);
+      Node word = yaml::scalar(pair.key);
       word.mark = pair.mark;
       *chosen = word;
       for (const Member& parameter : pair.value.members) {

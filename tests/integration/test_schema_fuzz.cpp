@@ -117,7 +117,7 @@ TEST(Fuzz, DamagedTexts) {
   RandomSequence random(20240601, Stream::test);
   for (const Reader& reader : readers) {
     int count = 0;
-    const int n = 1500;
+    const int n = 800;
     for (int i = 0; i < n; ++i) count += refused(reader, damaged(*reader.text, random));
     EXPECT_GT(count, n / 2) << reader.name;  // damage is noticed far more often than not
   }

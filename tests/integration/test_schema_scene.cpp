@@ -116,7 +116,7 @@ cells:
 domain:
   size: [0.05 mm, 5e-5 m, 50000 nm]
 fluid: {dx: 500 nm, tau: 2.0}
-coupling: {chi: 2.667}
+coupling: {chi: 2.667, retraction: 0.7}
 time: {surface: 0.05 s}
 )";
   EXPECT_EQ(parse_scene(other, "t.yaml").source_text, parse_scene(blood, "s.yaml").source_text);
