@@ -19,9 +19,8 @@ void check(const Law& law, const Domain& domain) {
               std::to_string(law.range) + " dx, stiffness " + std::to_string(law.stiffness) +
               ") correct the contact section");
   for (const double period : domain.period)
-    require(period == std::floor(period) && period >= 0,
-            "contact: period " + std::to_string(period) +
-                " dx is no whole number (images are integer shifts) make the box a multiple of dx");
+    require(period >= 0, "contact: period " + std::to_string(period) +
+                             " dx (it must be positive, or 0 for none) correct it");
 }
 
 std::vector<Topology> topologies(const std::vector<Shape>& shapes) {
@@ -258,6 +257,13 @@ void Contact<Real>::set_bodies(std::vector<Body> bodies) {
   s.force.resize(s.cloud.first.back());
   s.share.resize(s.cloud.bodies.size());
   s.neighbours.reset();
+}
+
+template <class Real>
+void Contact<Real>::set_domain(const Domain& domain) {
+  check(state_->law, domain);
+  state_->domain = domain;
+  state_->neighbours.set_domain(domain);
 }
 
 template <class Real>

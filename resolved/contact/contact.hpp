@@ -42,7 +42,7 @@ struct Walls {
 };
 
 struct Domain {
-  std::array<double, 3> period{0, 0, 0};  ///< whole lattice spacings; 0 = not periodic along this axis
+  std::array<double, 3> period{0, 0, 0};  ///< dx; 0 = not periodic along this axis
   Walls walls;
 };
 
@@ -75,12 +75,11 @@ struct Summary {
   std::array<std::array<double, 3>, 2> wall_force{};
 };
 
-/// Contact forces of one block. Linear in the number of markers: neighbours come from a uniform grid and are
+/// Contact forces of one block. Linear in the number of bodies: neighbours come from a uniform grid and are
 /// searched again only when two bodies approached each other by more than the skin.
 template <class Real>
 class Contact {
  public:
-  /// \throws InputError for a box narrower than the search radius or a period that is no whole number.
   Contact(const Law& law, const Domain& domain, std::vector<Shape> shapes);
   ~Contact();
   Contact(Contact&&) noexcept;
@@ -88,6 +87,9 @@ class Contact {
 
   /// The bodies from now on; body b of the arrays below. Also after bodies moved in memory.
   void set_bodies(std::vector<Body> bodies);
+
+  /// Changes the box, for packing. Walls and images move at once.
+  void set_domain(const Domain& domain);
 
   /// force[m] = contact force on marker m for all markers of bodies (others are left alone). Position of a
   /// marker: origin[body] + local[marker].xyz, each body in one piece; any periodic image will do. Allocates

@@ -2,32 +2,18 @@
 
 #include <omp.h>
 
-#include <string>
-
-#include "core/check.hpp"
 #include "core/simd.hpp"
 
 namespace hemowalk::contact {
 
 namespace {
 
-/// Half the difference between single and exact coordinates in the largest boxes, dx; added to search radii.
-constexpr double slack = 1e-3;
-/// Distances in the lists are in single precision; this much is taken off, so that they never exceed the true
+/// Lists are kept in single precision; this much is taken off distances, so that they never exceed the true
 /// ones.
 constexpr double rounding = 1e-5;
 
-std::uint64_t key_of(std::uint32_t target, const std::array<std::int32_t, 3>& wraps) {
-  std::uint64_t key = target;
-  for (int k = 0; k < 3; ++k) key = key << 8 | static_cast<std::uint64_t>(wraps[k] + 128);
-  return key;
-}
-std::uint32_t target_of(std::uint64_t key) { return static_cast<std::uint32_t>(key >> 24); }
-std::array<std::int32_t, 3> wraps_of(std::uint64_t key) {
-  std::array<std::int32_t, 3> wraps;
-  for (int k = 0; k < 3; ++k) wraps[k] = static_cast<std::int32_t>(key >> (8 * (2 - k)) & 255) - 128;
-  return wraps;
-}
+using Floats = Pack<float, 16>;
+constexpr std::size_t width = 16;
 
 }  // namespace
 
@@ -74,165 +60,122 @@ bool Neighbours<Real>::holds(const Cloud<Real>& cloud) {
 }
 
 template <class Real>
+void Neighbours<Real>::Stretch::start(std::size_t most) {
+  count = 0;
+  if (x.size() >= most + width) return;
+  for (auto* a : {&x, &y, &z, &r}) a->resize(most + width);
+  number.resize(most + width);
+}
+template <class Real>
+void Neighbours<Real>::Stretch::pad() {
+  for (std::size_t i = count; i < count + width; ++i) x[i] = y[i] = z[i] = 1e15f, r[i] = 0;
+}
+
+template <class Real>
 void Neighbours<Real>::search(const Cloud<Real>& cloud) {
   const std::size_t bodies = cloud.bodies.size();
   reference_ = cloud.x;
   reference_origin_ = cloud.origin;
   motions_.assign(bodies, Motion{{0, 0, 0}, 0});
   near_.resize(bodies);
+  boxes_.resize(bodies);
   scratch_.resize(static_cast<std::size_t>(omp_get_max_threads()));
+  spheres_begin_.assign(1, 0);
+  for (const Body& b : cloud.bodies)
+    spheres_begin_.push_back(spheres_begin_.back() +
+                             static_cast<std::uint32_t>(shapes_[b.shape].triangles.size()));
+  for (auto* a : {&gx_, &gy_, &gz_, &gr_}) a->resize(spheres_begin_.back() + width);
+  const auto count = static_cast<std::ptrdiff_t>(bodies);
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t b = 0; b < count; ++b) bound(cloud, static_cast<std::size_t>(b));
   pair_bodies(cloud);
-  sort_triangles(cloud);
 #pragma omp parallel for schedule(dynamic, 4)
-  for (std::ptrdiff_t b = 0; b < static_cast<std::ptrdiff_t>(bodies); ++b)
+  for (std::ptrdiff_t b = 0; b < count; ++b)
     look_around(cloud, static_cast<std::uint32_t>(b),
                 scratch_[static_cast<std::size_t>(omp_get_thread_num())]);
   collect_incoming(bodies);
 }
 
-/// Bounding boxes, and the pairs of bodies that are close enough to be watched.
+/// Bounding box of a body and spheres around its triangles.
+template <class Real>
+void Neighbours<Real>::bound(const Cloud<Real>& cloud, std::size_t b) {
+  const Point<Real>* x = cloud.x.data() + cloud.first[b];
+  Point<Real> lo = x[0], hi = lo;
+  for (std::size_t i = 0; i < cloud.vertices(b); ++i) {
+    lo = {std::min(lo.x, x[i].x), std::min(lo.y, x[i].y), std::min(lo.z, x[i].z)};
+    hi = {std::max(hi.x, x[i].x), std::max(hi.y, x[i].y), std::max(hi.z, x[i].z)};
+  }
+  const double l[3] = {double(lo.x), double(lo.y), double(lo.z)},
+               h[3] = {double(hi.x), double(hi.y), double(hi.z)};
+  for (int k = 0; k < 3; ++k)
+    boxes_[b].low[k] = cloud.origin[b][k] + l[k], boxes_[b].high[k] = cloud.origin[b][k] + h[k];
+  std::uint32_t i = spheres_begin_[b];
+  for (const Corners& c : shapes_[cloud.bodies[b].shape].triangles) {
+    const Point<Real> g = Real(1.0 / 3) * (x[c[0]] + x[c[1]] + x[c[2]]);
+    Real squared = 0;
+    for (const std::uint32_t v : c) squared = std::max(squared, dot(x[v] - g, x[v] - g));
+    gx_[i] = static_cast<float>(g.x), gy_[i] = static_cast<float>(g.y), gz_[i] = static_cast<float>(g.z);
+    gr_[i++] = static_cast<float>(std::sqrt(double(squared)) + reach_ + skin_ + rounding);
+  }
+}
+
+/// Pairs of bodies with bounding boxes, in any image, less than the watched distance apart; each body with
+/// itself where its own image may be that near.
 template <class Real>
 void Neighbours<Real>::pair_bodies(const Cloud<Real>& cloud) {
   const std::size_t bodies = cloud.bodies.size();
-  centre_.resize(bodies);
-  half_.resize(bodies);
-  body_slots_.resize(bodies);
   std::array<double, 3> low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
   double largest = 0;
-  for (std::size_t b = 0; b < bodies; ++b) {
-    Point<Real> lo = cloud.x[cloud.first[b]], hi = lo;
-    for (std::uint32_t i = cloud.first[b]; i < cloud.first[b + 1]; ++i) {
-      const Point<Real>& d = cloud.x[i];
-      lo = {std::min(lo.x, d.x), std::min(lo.y, d.y), std::min(lo.z, d.z)};
-      hi = {std::max(hi.x, d.x), std::max(hi.y, d.y), std::max(hi.z, d.z)};
-    }
-    const std::array<double, 3> l{double(lo.x), double(lo.y), double(lo.z)},
-        h{double(hi.x), double(hi.y), double(hi.z)};
+  const auto centre = [&](std::size_t b) {
+    std::array<double, 3> c;
+    for (int k = 0; k < 3; ++k) c[k] = (boxes_[b].low[k] + boxes_[b].high[k]) / 2;
+    return c;
+  };
+  for (std::size_t b = 0; b < bodies; ++b)
     for (int k = 0; k < 3; ++k) {
-      centre_[b][k] = cloud.origin[b][k] + (l[k] + h[k]) / 2;
-      half_[b][k] = (h[k] - l[k]) / 2;
-      largest = std::max(largest, half_[b][k]);
-      low[k] = std::min(low[k], centre_[b][k]);
-      high[k] = std::max(high[k], centre_[b][k]);
+      largest = std::max(largest, boxes_[b].high[k] - boxes_[b].low[k]);
+      low[k] = std::min(low[k], boxes_[b].low[k]);
+      high[k] = std::max(high[k], boxes_[b].high[k]);
     }
-  }
   const double limit = reach_ + skin_ + far_;
-  body_grid_.shape(low, high, domain_.period, 2 * largest + limit, 8 * bodies);
+  grid_.shape(low, high, domain_.period, largest + limit, 8 * bodies);
+  slots_.resize(bodies);
   for (std::size_t b = 0; b < bodies; ++b) {
-    std::array<double, 3> c = centre_[b];
-    body_slots_[b] = body_grid_.locate(c);
+    auto c = centre(b);
+    slots_[b] = grid_.locate(c);
   }
-  body_grid_.sort(body_slots_, bodies);
+  grid_.sort(slots_, bodies);
   watched_.clear();
+  targets_.clear();
+  targets_begin_.assign(1, 0);
   seen_.assign(bodies, ~0u);
-  for (std::uint32_t a = 0; a < bodies; ++a)
-    body_grid_.around(body_slots_[a].cell, [&](std::uint32_t begin, std::uint32_t end, const auto&) {
+  for (std::uint32_t a = 0; a < bodies; ++a) {
+    grid_.around(slots_[a].cell, [&](std::uint32_t begin, std::uint32_t end, const auto&) {
       for (std::uint32_t i = begin; i < end; ++i) {
-        const std::uint32_t b = body_grid_.order()[i];
-        if (b <= a || seen_[b] == a) continue;
-        double squared = 0;
+        const std::uint32_t b = grid_.order()[i];
+        if (seen_[b] == a) continue;
+        seen_[b] = a;
+        double squared = 0, own = limit;  // own: distance to the next image of a itself
         for (int k = 0; k < 3; ++k) {
-          double d = centre_[a][k] - centre_[b][k];
-          if (domain_.period[k] > 0) d -= domain_.period[k] * std::round(d / domain_.period[k]);
-          const double gap = std::max(0.0, std::abs(d) - half_[a][k] - half_[b][k]);
+          const double period = domain_.period[k],
+                       widths =
+                           (boxes_[a].high[k] - boxes_[a].low[k] + boxes_[b].high[k] - boxes_[b].low[k]) / 2;
+          double d = centre(a)[k] - centre(b)[k];
+          if (period > 0) d -= period * std::round(d / period), own = std::min(own, period - widths);
+          const double gap = std::max(0.0, std::abs(d) - widths);
           squared += gap * gap;
         }
-        if (squared > limit * limit) continue;
-        seen_[b] = a;
-        watched_.push_back({a, b});
+        if (a == b ? own >= limit : squared >= limit * limit) continue;
+        if (b >= a) watched_.push_back({a, b});
+        targets_.push_back(b);
       }
     });
-  meets_itself_.assign(bodies, 0);
-  for (std::uint32_t a = 0; a < bodies; ++a)
-    for (int k = 0; k < 3; ++k)
-      if (domain_.period[k] > 0 && domain_.period[k] - 2 * half_[a][k] < limit) {
-        watched_.push_back({a, a});
-        meets_itself_[a] = true;
-        break;
-      }
-}
-
-template <class Real>
-void Neighbours<Real>::sort_triangles(const Cloud<Real>& cloud) {
-  const std::size_t bodies = cloud.bodies.size();
-  triangles_begin_.resize(bodies + 1);
-  for (std::size_t b = 0; b < bodies; ++b)
-    triangles_begin_[b + 1] =
-        triangles_begin_[b] + static_cast<std::uint32_t>(shapes_[cloud.bodies[b].shape].triangles.size());
-  const std::size_t count = triangles_begin_[bodies];
-  slots_.resize(count);
-  radius_.resize(count);
-  constexpr std::size_t pad = 16;  // lets packs read past the end
-  for (auto* a : {&cx_, &cy_, &cz_, &cr_, &cmark_}) a->resize(count + pad);
-  cbody_.resize(count + pad);
-  ctriangle_.resize(count + pad);
-  cwraps_.resize(count + pad);
-
-  // Radii first: the largest sets the cells.
-  float largest = 0;
-#pragma omp parallel for schedule(static) reduction(max : largest)
-  for (std::ptrdiff_t b = 0; b < static_cast<std::ptrdiff_t>(bodies); ++b) {
-    const Point<Real>* x = cloud.x.data() + cloud.first[b];
-    std::uint32_t i = triangles_begin_[b];
-    for (const Corners& c : shapes_[cloud.bodies[b].shape].triangles) {
-      const Point<Real> g = Real(1.0 / 3) * (x[c[0]] + x[c[1]] + x[c[2]]);
-      Real squared = 0;
-      for (const std::uint32_t v : c) squared = std::max(squared, dot(x[v] - g, x[v] - g));
-      radius_[i] = static_cast<float>(std::sqrt(squared) + reach_ + skin_ + slack);
-      largest = std::max(largest, radius_[i++]);
-    }
-  }
-  std::array<double, 3> low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-  for (std::size_t b = 0; b < bodies; ++b)
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], centre_[b][k] - half_[b][k]);
-      high[k] = std::max(high[k], centre_[b][k] + half_[b][k]);
-    }
-  for (int k = 0; k < 3; ++k)
-    require(domain_.period[k] <= 0 || domain_.period[k] >= largest, [&] {
-      return "contact: period " + std::to_string(domain_.period[k]) + " dx is below the search radius " +
-             std::to_string(largest) +
-             " dx (a body would meet itself twice) use a larger box or finer meshes";
-    });
-  grid_.shape(low, high, domain_.period, largest, count);
-#pragma omp parallel for schedule(static)
-  for (std::ptrdiff_t b = 0; b < static_cast<std::ptrdiff_t>(bodies); ++b) {
-    const Point<Real>* x = cloud.x.data() + cloud.first[b];
-    std::uint32_t i = triangles_begin_[b];
-    for (const Corners& c : shapes_[cloud.bodies[b].shape].triangles) {
-      const Point<Real> g = Real(1.0 / 3) * (x[c[0]] + x[c[1]] + x[c[2]]);
-      std::array<double, 3> at{cloud.origin[b][0] + double(g.x), cloud.origin[b][1] + double(g.y),
-                               cloud.origin[b][2] + double(g.z)};
-      slots_[i++] = grid_.locate(at);
-    }
-  }
-  grid_.sort(slots_, count);
-  // In cell order, with coordinates in the box.
-#pragma omp parallel for schedule(static)
-  for (std::ptrdiff_t b = 0; b < static_cast<std::ptrdiff_t>(bodies); ++b)
-    for (std::uint32_t i = triangles_begin_[b]; i < triangles_begin_[b + 1]; ++i)
-      slots_[i].cell = static_cast<std::uint32_t>(b);
-#pragma omp parallel for schedule(static)
-  for (std::ptrdiff_t s = 0; s < static_cast<std::ptrdiff_t>(count); ++s) {
-    const std::uint32_t i = grid_.order()[s], b = slots_[i].cell, t = i - triangles_begin_[b];
-    const Point<Real>* x = cloud.x.data() + cloud.first[b];
-    const Corners& c = shapes_[cloud.bodies[b].shape].triangles[t];
-    const Point<Real> g = Real(1.0 / 3) * (x[c[0]] + x[c[1]] + x[c[2]]);
-    const double at[3] = {double(g.x), double(g.y), double(g.z)};
-    float boxed[3];
-    for (int k = 0; k < 3; ++k) {
-      const std::int32_t wraps = slots_[i].wraps[k];
-      boxed[k] = static_cast<float>(cloud.origin[b][k] + at[k] - wraps * domain_.period[k]);
-      cwraps_[s][k] = static_cast<std::int8_t>(wraps - body_slots_[b].wraps[k]);
-    }
-    cx_[s] = boxed[0], cy_[s] = boxed[1], cz_[s] = boxed[2];
-    cr_[s] = radius_[i];
-    cbody_[s] = b;
-    cmark_[s] = static_cast<float>(b);
-    ctriangle_[s] = t;
+    std::sort(targets_.begin() + targets_begin_.back(), targets_.end());
+    targets_begin_.push_back(static_cast<std::uint32_t>(targets_.size()));
   }
 }
 
+/// Origin of a body as seen from another's.
 template <class Real>
 Point<Real> Neighbours<Real>::shift(const Cloud<Real>& cloud, std::uint32_t from, std::uint32_t to,
                                     const std::array<std::int32_t, 3>& wraps) const {
@@ -242,87 +185,132 @@ Point<Real> Neighbours<Real>::shift(const Cloud<Real>& cloud, std::uint32_t from
   return {s[0], s[1], s[2]};
 }
 
-/// Keys name images relative to where the bodies' centres fell in the box; this is what the caller's
-/// coordinates need.
+/// All images of all bodies whose boxes come within reach of this one's.
 template <class Real>
-std::array<std::int32_t, 3> Neighbours<Real>::absolute(std::uint32_t from, std::uint64_t key) const {
-  std::array<std::int32_t, 3> wraps = wraps_of(key);
-  for (int k = 0; k < 3; ++k) wraps[k] += body_slots_[from].wraps[k] - body_slots_[target_of(key)].wraps[k];
-  return wraps;
-}
-
-template <class Real>
-void Neighbours<Real>::look_around(const Cloud<Real>& cloud, std::uint32_t body, Scratch& scratch) {
-  Neighbourhood<Real>& near = near_[body];
+void Neighbours<Real>::look_around(const Cloud<Real>& cloud, std::uint32_t a, Scratch& scratch) {
+  Neighbourhood<Real>& near = near_[a];
   near.links.clear();
   near.entries.clear();
   near.candidates.clear();
   near.presses.clear();
-  scratch.found.clear();
-  scratch.candidates.clear();
-  for (std::uint32_t v = 0; v < cloud.vertices(body); ++v) {
-    find_triangles(cloud, body, v, scratch);
-    if (!scratch.hits.empty()) take_entries(cloud, body, v, scratch);
+  const double within = reach_ + skin_;
+  for (std::uint32_t i = targets_begin_[a]; i < targets_begin_[a + 1]; ++i) {
+    const std::uint32_t b = targets_[i];
+    if (!cloud.bodies[a].owned && !cloud.bodies[b].owned) continue;
+    std::array<std::int32_t, 3> first{}, last{}, w;
+    for (int k = 0; k < 3; ++k) {
+      const double below = boxes_[a].low[k] - boxes_[b].high[k] - within,
+                   above = boxes_[a].high[k] - boxes_[b].low[k] + within;
+      const double period = domain_.period[k];
+      first[k] = period > 0 ? static_cast<std::int32_t>(std::ceil(below / period)) : below > 0;
+      last[k] = period > 0 ? static_cast<std::int32_t>(std::floor(above / period)) : -(above < 0);
+    }
+    for (w[0] = first[0]; w[0] <= last[0]; ++w[0])
+      for (w[1] = first[1]; w[1] <= last[1]; ++w[1])
+        for (w[2] = first[2]; w[2] <= last[2]; ++w[2])
+          if (a != b || w[0] != 0 || w[1] != 0 || w[2] != 0) look_at(cloud, a, b, w, scratch);
   }
-  link_up(body, scratch);
 }
 
-/// All triangles of other bodies, or of other images of this one, within reach + skin of a vertex.
+/// Entries of a body's vertices for one image of another body.
 template <class Real>
-void Neighbours<Real>::find_triangles(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex,
-                                      Scratch& scratch) {
+void Neighbours<Real>::look_at(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target,
+                               const std::array<std::int32_t, 3>& wraps, Scratch& scratch) {
+  const Point<Real> s = shift(cloud, body, target, wraps);
+  if (!select(cloud, body, target, s, scratch)) return;
+  Neighbourhood<Real>& near = near_[body];
+  const auto begin = static_cast<std::uint32_t>(near.entries.size());
+  for (std::size_t v = 0; v < scratch.vertices.count; ++v) {
+    const std::uint32_t vertex = scratch.vertices.number[v];
+    const Point<Real> p = cloud.x[cloud.first[body] + vertex] - s;
+    find_hits(cloud, target, p, v, scratch);
+    if (!scratch.hits.empty()) take_entry(cloud, body, target, p, vertex, scratch);
+  }
+  const auto end = static_cast<std::uint32_t>(near.entries.size());
+  if (end > begin) near.links.push_back({target, wraps, begin, end, 0, 0});
+}
+
+/// The body's vertices near the other's bounding box, and the other's triangles near those vertices, both
+/// relative to the other's origin. \returns whether there are any.
+template <class Real>
+bool Neighbours<Real>::select(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target,
+                              const Point<Real>& shift, Scratch& scratch) const {
+  const double within = reach_ + skin_ + rounding;
+  float low[3], high[3];
+  for (int k = 0; k < 3; ++k) {
+    low[k] = static_cast<float>(boxes_[target].low[k] - cloud.origin[target][k] - within);
+    high[k] = static_cast<float>(boxes_[target].high[k] - cloud.origin[target][k] + within);
+  }
+  Stretch& vertices = scratch.vertices;
+  vertices.start(cloud.vertices(body));
+  const Point<Real>* x = cloud.x.data() + cloud.first[body];
+  float lo[3] = {1e30f, 1e30f, 1e30f}, hi[3] = {-1e30f, -1e30f, -1e30f};
+  for (std::uint32_t v = 0; v < cloud.vertices(body); ++v) {
+    const Point<Real> q = x[v] - shift;
+    const float p[3] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z)};
+    if (p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] || p[2] < low[2] || p[2] > high[2])
+      continue;
+    for (int k = 0; k < 3; ++k) lo[k] = std::min(lo[k], p[k]), hi[k] = std::max(hi[k], p[k]);
+    vertices.add(p[0], p[1], p[2], 0, v);
+  }
+  if (vertices.count == 0) return false;
+  Stretch& triangles = scratch.triangles;
+  const std::uint32_t begin = spheres_begin_[target], count = spheres_begin_[target + 1] - begin;
+  triangles.start(count);
+  const auto beyond = [](const Floats& c, float l, float h) {
+    return stdx::max(stdx::max(l - c, c - h), Floats(0));
+  };
+  for (std::uint32_t t = 0; t < count; t += width) {
+    const std::size_t g = begin + t;
+    const Floats dx = beyond(load<float, 16>(&gx_[g]), lo[0], hi[0]),
+                 dy = beyond(load<float, 16>(&gy_[g]), lo[1], hi[1]),
+                 dz = beyond(load<float, 16>(&gz_[g]), lo[2], hi[2]), r = load<float, 16>(&gr_[g]);
+    auto close = dx * dx + dy * dy + dz * dz <= r * r;
+    while (stdx::any_of(close)) {
+      const auto lane = static_cast<std::uint32_t>(stdx::find_first_set(close));
+      close[lane] = false;
+      if (t + lane < count)
+        triangles.add(gx_[g + lane], gy_[g + lane], gz_[g + lane], gr_[g + lane], t + lane);
+    }
+  }
+  triangles.pad();
+  return triangles.count > 0;
+}
+
+/// The selected triangles within reach + skin of a vertex at p.
+template <class Real>
+void Neighbours<Real>::find_hits(const Cloud<Real>& cloud, std::uint32_t target, const Point<Real>& p,
+                                 std::size_t vertex, Scratch& scratch) const {
   scratch.hits.clear();
   for (auto& c : scratch.corner) c.clear();
-  const Point<Real> p = cloud.x[cloud.first[body] + vertex];
-  std::array<double, 3> at{cloud.origin[body][0] + double(p.x), cloud.origin[body][1] + double(p.y),
-                           cloud.origin[body][2] + double(p.z)};
-  const Slot slot = grid_.locate(at);
-  const bool owned = cloud.bodies[body].owned;
-  const float mine = meets_itself_[body] ? -1.0f : static_cast<float>(body);
-  using P = Pack<float, 16>;
-  grid_.around(slot.cell, [&](std::uint32_t begin, std::uint32_t end,
-                              const std::array<std::int32_t, 3>& wraps) {
-    float o[3];
-    for (int k = 0; k < 3; ++k) o[k] = static_cast<float>(at[k] - wraps[k] * domain_.period[k]);
-    for (std::uint32_t i = begin; i < end; i += 16) {
-      const P dx = load<float, 16>(&cx_[i]) - o[0], dy = load<float, 16>(&cy_[i]) - o[1],
-              dz = load<float, 16>(&cz_[i]) - o[2], r = load<float, 16>(&cr_[i]);
-      auto close = dx * dx + dy * dy + dz * dz < r * r && load<float, 16>(&cmark_[i]) != mine;
-      while (stdx::any_of(close)) {
-        const auto lane = static_cast<std::uint32_t>(stdx::find_first_set(close));
-        close[lane] = false;
-        const std::uint32_t j = i + lane;
-        if (j >= end) break;
-        const std::uint32_t other = cbody_[j];
-        std::array<std::int32_t, 3> image;  // of the other body, seen from this one
-        bool same = other == body;
-        for (int k = 0; k < 3; ++k) {
-          // Stands at boxed + wraps L; the vertex itself at boxed + slot.wraps L.
-          const std::int32_t boxes = wraps[k] - cwraps_[j][k] + slot.wraps[k] - body_slots_[body].wraps[k];
-          image[k] = boxes;
-          same = same && boxes == 0;
-        }
-        if (same || (!owned && !cloud.bodies[other].owned)) continue;
-        const std::uint64_t key = key_of(other, image);
-        const Point<Real> q = p - shift(cloud, body, other, absolute(body, key));
-        const Point<Real>* x = cloud.x.data() + cloud.first[other];
-        const Corners& c = shapes_[cloud.bodies[other].shape].triangles[ctriangle_[j]];
-        scratch.hits.push_back({key, ctriangle_[j], 0});
-        for (int k = 0; k < 3; ++k) {
-          const Point<Real> r = x[c[k]] - q;
-          scratch.corner[3 * k].push_back(static_cast<float>(r.x));
-          scratch.corner[3 * k + 1].push_back(static_cast<float>(r.y));
-          scratch.corner[3 * k + 2].push_back(static_cast<float>(r.z));
-        }
+  const Point<Real>* x = cloud.x.data() + cloud.first[target];
+  const Topology& shape = shapes_[cloud.bodies[target].shape];
+  const float px = scratch.vertices.x[vertex], py = scratch.vertices.y[vertex],
+              pz = scratch.vertices.z[vertex];
+  const Stretch& s = scratch.triangles;
+  for (std::size_t i = 0; i < s.count; i += width) {
+    const Floats dx = load<float, 16>(&s.x[i]) - px, dy = load<float, 16>(&s.y[i]) - py,
+                 dz = load<float, 16>(&s.z[i]) - pz, r = load<float, 16>(&s.r[i]);
+    auto close = dx * dx + dy * dy + dz * dz <= r * r;
+    while (stdx::any_of(close)) {
+      const auto lane = static_cast<std::size_t>(stdx::find_first_set(close));
+      close[lane] = false;
+      const std::uint32_t t = s.number[i + lane];
+      scratch.hits.push_back({t, 0});
+      for (int k = 0; k < 3; ++k) {
+        const Point<Real> c = x[shape.triangles[t][k]] - p;
+        scratch.corner[3 * k].push_back(static_cast<float>(c.x));
+        scratch.corner[3 * k + 1].push_back(static_cast<float>(c.y));
+        scratch.corner[3 * k + 2].push_back(static_cast<float>(c.z));
       }
     }
-  });
-  measure_hits(scratch);
+  }
+  if (!scratch.hits.empty()) measure_hits(scratch);
 }
 
 /// Exact distances for the hits, 16 at a time; those out of reach are dropped.
 template <class Real>
-void Neighbours<Real>::measure_hits(Scratch& scratch) {
+void Neighbours<Real>::measure_hits(Scratch& scratch) const {
   using P = Pack<float, 16>;
   auto& hits = scratch.hits;
   const std::size_t count = hits.size(), padded = (count + 15) / 16 * 16;
@@ -347,62 +335,30 @@ void Neighbours<Real>::measure_hits(Scratch& scratch) {
   hits.resize(kept);
 }
 
-/// Turns the hits of one vertex into one entry per body it is near to.
+/// Turns the hits of a vertex into an entry.
 template <class Real>
-void Neighbours<Real>::take_entries(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex,
-                                    Scratch& scratch) {
+void Neighbours<Real>::take_entry(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target,
+                                  const Point<Real>& p, std::uint32_t vertex, Scratch& scratch) {
   auto& hits = scratch.hits;
   std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) {
-    if (a.key != b.key) return a.key < b.key;
     return a.distance != b.distance ? a.distance < b.distance : a.triangle < b.triangle;
   });
-  for (std::size_t i = 0; i < hits.size();) {
-    const Hit& best = hits[i];
-    std::size_t end = i + 1;
-    while (end < hits.size() && hits[end].key == best.key) ++end;
-    const std::uint32_t target = target_of(best.key);
-    const Topology& shape = shapes_[cloud.bodies[target].shape];
-    const Point<Real>* x = cloud.x.data() + cloud.first[target];
-    const Corners& c = shape.triangles[best.triangle];
-    const Point<Real> p =
-        cloud.x[cloud.first[body] + vertex] - shift(cloud, body, target, absolute(body, best.key));
-    const auto q = nearest_on_triangle(p, x[c[0]], x[c[1]], x[c[2]]);
-    const bool outside = dot(q.to_point, pseudo_normal(shape, x, best.triangle, q.wb, q.wc)) >= 0;
-    if (best.distance <= (outside ? law_.range : law_.depth) + skin_) {
-      // A triangle farther by two skins cannot become the nearest before the next search.
-      std::size_t last = i;
-      while (last < end && hits[last].distance <= best.distance + 2 * skin_) ++last;
-      scratch.found.push_back(
-          {best.key,
-           {vertex, static_cast<std::uint32_t>(scratch.candidates.size()),
-            static_cast<std::uint32_t>(last - i), outside ? best.distance : -best.distance}});
-      for (std::size_t j = i; j < last; ++j)
-        scratch.candidates.push_back({hits[j].triangle, hits[j].distance});
-    }
-    i = end;
-  }
-}
-
-/// Orders the entries of a body by the body they look at.
-template <class Real>
-void Neighbours<Real>::link_up(std::uint32_t body, Scratch& scratch) {
+  const Hit best = hits.front();
+  const Topology& shape = shapes_[cloud.bodies[target].shape];
+  const Point<Real>* x = cloud.x.data() + cloud.first[target];
+  const Corners& c = shape.triangles[best.triangle];
+  const auto q = nearest_on_triangle(p, x[c[0]], x[c[1]], x[c[2]]);
+  const bool outside = dot(q.to_point, pseudo_normal(shape, x, best.triangle, q.wb, q.wc)) >= 0;
+  if (best.distance > (outside ? law_.range : law_.depth) + skin_) return;
   Neighbourhood<Real>& near = near_[body];
-  std::sort(scratch.found.begin(), scratch.found.end(), [](const Found& a, const Found& b) {
-    return a.key != b.key ? a.key < b.key : a.entry.vertex < b.entry.vertex;
-  });
-  for (const Found& f : scratch.found) {
-    const auto at = static_cast<std::uint32_t>(near.entries.size());
-    if (near.links.empty() || scratch.link_key != f.key) {
-      scratch.link_key = f.key;
-      near.links.push_back({target_of(f.key), absolute(body, f.key), at, at, 0, 0});
-    }
-    Entry entry = f.entry;
-    entry.candidates = static_cast<std::uint32_t>(near.candidates.size());
-    const auto from = scratch.candidates.begin() + f.entry.candidates;
-    near.candidates.insert(near.candidates.end(), from, from + entry.count);
-    near.entries.push_back(entry);
-    near.links.back().entries_end = at + 1;
+  const auto first = static_cast<std::uint32_t>(near.candidates.size());
+  for (const Hit& hit : hits) {
+    // A triangle farther by two skins cannot become the nearest before the next search.
+    if (hit.distance > best.distance + 2 * skin_) break;
+    near.candidates.push_back({hit.triangle, hit.distance});
   }
+  near.entries.push_back({vertex, first, static_cast<std::uint32_t>(near.candidates.size()) - first,
+                          outside ? best.distance : -best.distance});
 }
 
 template <class Real>

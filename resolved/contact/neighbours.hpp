@@ -91,10 +91,11 @@ class Neighbours {
   void update(const Cloud<Real>& cloud);
   /// Forgets the lists: bodies changed.
   void reset() { valid_ = false; }
+  void set_domain(const Domain& domain) { domain_ = domain, valid_ = false; }
 
   std::vector<Neighbourhood<Real>>& of() { return near_; }
   const std::vector<Motion>& motions() const { return motions_; }
-  /// Links that point at body \p b: [incoming_begin(b), incoming_begin(b + 1)), by looking body.
+  /// Links that point at body b: incoming()[incoming_begin()[b] .. incoming_begin()[b + 1]), by looking body.
   const std::vector<std::uint32_t>& incoming_begin() const { return incoming_begin_; }
   const std::vector<Incoming>& incoming() const { return incoming_; }
   std::int64_t searches() const { return searches_; }
@@ -103,36 +104,48 @@ class Neighbours {
                     const std::array<std::int32_t, 3>& wraps) const;
 
  private:
-  static constexpr double far_ =
-      6;  ///< dx beyond the skin within which pairs of bodies are watched one by one
+  static constexpr double far_ = 6;  ///< dx beyond the skin within which pairs of bodies are watched
 
+  /// Bounding box, absolute coordinates.
+  struct Box {
+    std::array<double, 3> low, high;
+  };
   struct Hit {
-    std::uint64_t key;  ///< target and image
     std::uint32_t triangle;
     float distance;
   };
-  struct Found {
-    std::uint64_t key;
-    Entry entry;
+  /// Points or spheres side by side, room for whole packs.
+  struct Stretch {
+    std::vector<float> x, y, z, r;
+    std::vector<std::uint32_t> number;
+    std::size_t count = 0;
+
+    void start(std::size_t most);
+    void add(float px, float py, float pz, float pr, std::uint32_t n) {
+      x[count] = px, y[count] = py, z[count] = pz, r[count] = pr, number[count++] = n;
+    }
+    void pad();  ///< fills the last pack with points that are far from everything
   };
-  struct Scratch {  ///< of one thread
-    std::vector<Hit> hits;
+  struct Scratch {                             ///< of one thread
+    Stretch vertices, triangles;               ///< of the looking and the other body, near each other
+    std::vector<Hit> hits;                     ///< of one vertex
     std::array<std::vector<float>, 9> corner;  ///< of the hits' triangles, relative to the vertex
-    std::vector<Found> found;
-    std::vector<Candidate> candidates;
-    std::uint64_t link_key = 0;
   };
 
   bool holds(const Cloud<Real>& cloud);
   void search(const Cloud<Real>& cloud);
-  void sort_triangles(const Cloud<Real>& cloud);
+  void bound(const Cloud<Real>& cloud, std::size_t body);
   void pair_bodies(const Cloud<Real>& cloud);
   void look_around(const Cloud<Real>& cloud, std::uint32_t body, Scratch& scratch);
-  void find_triangles(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex, Scratch& scratch);
-  void measure_hits(Scratch& scratch);
-  std::array<std::int32_t, 3> absolute(std::uint32_t from, std::uint64_t key) const;
-  void take_entries(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t vertex, Scratch& scratch);
-  void link_up(std::uint32_t body, Scratch& scratch);
+  void look_at(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target,
+               const std::array<std::int32_t, 3>& wraps, Scratch& scratch);
+  bool select(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target, const Point<Real>& shift,
+              Scratch& scratch) const;
+  void find_hits(const Cloud<Real>& cloud, std::uint32_t target, const Point<Real>& p, std::size_t vertex,
+                 Scratch& scratch) const;
+  void measure_hits(Scratch& scratch) const;
+  void take_entry(const Cloud<Real>& cloud, std::uint32_t body, std::uint32_t target, const Point<Real>& p,
+                  std::uint32_t vertex, Scratch& scratch);
   void collect_incoming(std::size_t bodies);
 
   Law law_;
@@ -145,23 +158,19 @@ class Neighbours {
   std::vector<Point<Real>> reference_;  ///< positions at the search
   std::vector<Origin> reference_origin_;
   std::vector<Motion> motions_;
-  std::vector<std::array<std::uint32_t, 2>> watched_;  ///< pairs of bodies that could meet before the rest
+  std::vector<std::array<std::uint32_t, 2>> watched_;   ///< pairs of bodies that could meet before the rest
+  std::vector<std::uint32_t> targets_begin_, targets_;  ///< per body: whom it may be near to, itself too
   std::vector<Neighbourhood<Real>> near_;
   std::vector<std::uint32_t> incoming_begin_;
   std::vector<Incoming> incoming_;
 
-  Grid grid_, body_grid_;
-  std::vector<std::uint32_t> triangles_begin_;  ///< [bodies + 1]
-  std::vector<Slot> slots_, body_slots_;
-  std::vector<float> radius_;                         ///< of triangles about their centroid, before sorting
-  std::vector<std::array<double, 3>> centre_, half_;  ///< of the bodies' bounding boxes
+  std::vector<Box> boxes_;
+  Grid grid_;
+  std::vector<Slot> slots_;
   std::vector<std::uint32_t> seen_;
-  std::vector<std::uint8_t> meets_itself_;  ///< [bodies] its own image is near
-  /// Triangles in cell order: centroid in the box, radius of the search sphere, body, number, wraps.
-  std::vector<float> cx_, cy_, cz_, cr_;
-  std::vector<float> cmark_;  ///< the body again, as a number that packs compare (exact below 2^24 bodies)
-  std::vector<std::uint32_t> cbody_, ctriangle_;
-  std::vector<std::array<std::int8_t, 4>> cwraps_;
+  std::vector<std::uint32_t> spheres_begin_;  ///< [bodies + 1]
+  /// Centroid of every triangle relative to its body's origin and radius of the sphere to search around it.
+  std::vector<float> gx_, gy_, gz_, gr_;
   std::vector<Scratch> scratch_;
 };
 
