@@ -36,8 +36,8 @@ struct Parameters {
   bool walls_y = true;  ///< bounce-back walls at y = 0 and y = ny, else periodic y
   Vec3 lower_wall_velocity{}, upper_wall_velocity{};  ///< the y component must be 0
   Vec3 body_force{};                                  ///< per node and step, in addition to the force field
-  bool divided_z =
-      false;  ///< the planes k = -1 and nz belong to other blocks (begin_advance), else periodic z
+  /// The planes k = -1 and nz belong to other blocks (see begin_advance), else periodic z.
+  bool divided_z = false;
 };
 
 /// The two ends of a block along z.
@@ -70,9 +70,9 @@ struct PlanarProfiles {
 };
 
 /// D3Q19 fluid, one population set updated in place (AA pattern), SIMD along x, one z-slab per OpenMP thread.
-/// Results do not depend, bit for bit, on the number of threads. No call allocates after construction except
-/// set_solid(), initialise(), profiles(), save().
-/// \tparam Real float or double: the type of populations and arithmetic. Populations are stored as f_i - w_i.
+/// Results do not depend, bit for bit, on the number of threads. Steps, moments() and wall_impulse() do not
+/// allocate.
+/// \tparam Real float or double: the type of populations (stored as f_i - w_i) and arithmetic.
 template <class Real>
 class Fluid {
  public:
@@ -137,7 +137,8 @@ class Fluid {
   /// Profiles of the current state; \p force is the field that acts (or acted last), empty = body force only.
   PlanarProfiles profiles(View<const Node4<Real>> force) const;
 
-  /// Complete state, exact, independent of thread count and padding. load() wants the same block and Real.
+  /// Complete state, exact, independent of thread count and padding: a header, then the planes in order, so
+  /// that the states of blocks divided along z can be cut and joined. load() wants the same block and Real.
   std::vector<std::byte> save() const;
   /// \throws InputError if \p state was not saved by a fluid of the same size and type.
   void load(View<const std::byte> state);
