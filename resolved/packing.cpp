@@ -111,7 +111,7 @@ class Packing {
       0.5;                                     ///< vertex mass over K A h^2: explicit contact stays stable
   static constexpr double persistence = 0.95;  ///< of velocities from step to step
   static constexpr int patience = 400;         ///< steps granted for the wished gap
-  static constexpr int surrender = 2500;       ///< steps without any shrinking that end the attempt
+  static constexpr int surrender = 1500;       ///< steps without any shrinking that end the attempt
 
   void add_groups();
   void scatter();
@@ -248,6 +248,18 @@ void Packing::scatter() {
       largest = std::max(largest, radius_of(b.kind));
     }
   const double room = static_cast<double>(block_.interior());
+  double needed = 0;  // with half the smallest gap around every cell
+  for (const Batch& b : batches)
+    if (b.cells > 0) {
+      const mesh::TriangleMesh rest = make_mesh(scene_.cells.kinds[b.kind], units_.dx);
+      needed += b.cells * (mesh::volume(rest) + mesh::area(rest) * smallest_packed_gap / 2);
+    }
+  require(needed < room, [&] {
+    return fmt::format(
+        "cells.hematocrit {:g} cannot be packed (cells with gaps of {:g} dx fill {:.0f} % of the box) lower "
+        "it",
+        scene_.cells.hematocrit.value_or(0), smallest_packed_gap, 100 * needed / room);
+  });
   scale_ = std::min(start_scale, std::cbrt(start_fraction * room / std::max(spheres, 1e-9)));
   const contact::Domain box = domain(scale_);
   const Vec3 size{block_.nx / scale_, block_.ny / scale_, block_.nz / scale_};

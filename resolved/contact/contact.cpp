@@ -108,6 +108,9 @@ void Contact<Real>::State::press_walls(std::size_t b) {
   const std::size_t n = cloud.vertices(b);
   std::fill(f, f + n, Point<Real>{0, 0, 0});
   if (domain.walls.geometry == Walls::Geometry::none || !cloud.bodies[b].owned) return;
+  if (domain.walls.geometry == Walls::Geometry::slab &&
+      !neighbours.beyond(b, domain.walls.lower + law.range, domain.walls.upper - law.range))
+    return;
   const WallGaps<Real> walls(domain.walls, cloud.origin[b]);
   for (std::size_t v = 0; v < n; ++v) {
     const WallGap<Real> nearest = walls(x[v]);

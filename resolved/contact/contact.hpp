@@ -30,7 +30,7 @@ struct Law {
   double range = 1;      ///< rc: gap at which the potential starts, dx
   double stiffness = 0;  ///< K: pressure per length
   double depth = 1;      ///< penetration that is still seen, dx; packing from overlapping states wants more
-  double skin = 0.5;     ///< bodies may approach by this much before neighbours are searched again, dx
+  double skin = 0.35;    ///< bodies may approach by this much before neighbours are searched again, dx
 };
 
 /// Rigid surfaces that enclose the fluid.
@@ -64,7 +64,7 @@ struct Body {
 /// Sums over all contacts that involve an owned body. Deterministic for any number of threads.
 struct Summary {
   double minimum_gap = std::numeric_limits<double>::infinity();       ///< dx; exact when below the range
-  double minimum_wall_gap = std::numeric_limits<double>::infinity();  ///< dx
+  double minimum_wall_gap = std::numeric_limits<double>::infinity();  ///< dx; likewise
   std::int64_t contacts = 0;       ///< vertices pressed by another body's surface
   std::int64_t wall_contacts = 0;  ///< vertices pressed by a wall
   double energy = 0;               ///< of both

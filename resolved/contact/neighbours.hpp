@@ -99,6 +99,11 @@ class Neighbours {
   const std::vector<std::uint32_t>& incoming_begin() const { return incoming_begin_; }
   const std::vector<Incoming>& incoming() const { return incoming_; }
   std::int64_t searches() const { return searches_; }
+  /// Whether a body's bounding box, moved as the body did since the search, may reach beyond planes y = low, high.
+  bool beyond(std::size_t b, double low, double high) const {
+    const Motion& m = motions_[b];
+    return boxes_[b].low[1] + m.mean[1] - m.spread < low || boxes_[b].high[1] + m.mean[1] + m.spread > high;
+  }
   /// Origin of body \p to as seen from the origin of body \p from, in the image \p wraps.
   Point<Real> shift(const Cloud<Real>& cloud, std::uint32_t from, std::uint32_t to,
                     const std::array<std::int32_t, 3>& wraps) const;

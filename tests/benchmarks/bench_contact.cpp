@@ -32,7 +32,7 @@ test::ContactBodies<float> reference_crowd() {
   return set;
 }
 
-const contact::Law law{1.0, 0.01, 1.0, 0.5};
+const contact::Law law{1.0, 0.01, 1.0, 0.35};
 const contact::Domain box{{100, 0, 100}, {contact::Walls::Geometry::slab, 0, 100, 0, 0, 0}};
 
 void count(benchmark::State& state, const contact::Summary& sum, const test::ContactBodies<float>& set) {
