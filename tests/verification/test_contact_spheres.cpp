@@ -120,7 +120,7 @@ TEST(ContactSpheres, WorkBecomesEnergy) {
     if (h >= 1.0 + 0.01) {
       EXPECT_EQ(now.energy, 0);
     }
-    ASSERT_NEAR(work, now.energy, 2 * rule + 1e-10) << h;
+    ASSERT_NEAR(work, now.energy, 2 * rule + 1e-8) << h;
   }
   EXPECT_GT(work, 1);
 }
