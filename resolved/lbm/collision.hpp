@@ -16,21 +16,46 @@
 /// v = u* + tau/2 F/rho. Hence one collision for both: relax to the force-free equilibrium of u* and add
 ///   w [3 c.F + B(v, F)],   v = u* + shift F/rho.
 /// The physical velocity is u = u* + F/(2 rho). They differ in F^2 only (method 5.2, step 5).
+///
+/// **Cost.** The even targets of both are one quadratic form in c.j and c.F over rho, which factorises:
+///   4.5 omega_plus (c.j)^2 + 9 (c.j)(c.F) + 9 shift (c.F)^2 = (c.p)(c.r),
+///   p = alpha j + (beta - delta) F,  r = alpha j + (beta + delta) F,
+///   alpha^2 = 4.5 omega_plus,  beta = 9/(2 alpha),  delta^2 = beta^2 - 9 shift
+/// (delta = 0 for Shan-Chen, delta^2 = 4.5/omega_plus (1 - omega_plus/2)^2 for Guo), and its isotropic part
+/// is -p.r/3. So a pair of directions needs c.p, c.r and, for the odd part, c.a; weights are taken into p, a.
+
+#include <cmath>
 
 #include "resolved/lbm/d3q19.hpp"
 
 namespace hemowalk::lbm {
 
-/// Rates of a collision in the precision of the populations.
+/// Constants of a collision in the precision of the populations. Vectors p and a carry the weight 1/36 of a
+/// diagonal direction.
 template <class Real>
 struct Relaxation {
-  Real omega_plus, omega_minus;  ///< rates of even and odd parts
-  Real keep_plus, keep_minus;    ///< (1 - omega)/2: what is kept of f_i +- f_opposite
-  Real shift;                    ///< of the velocity in the force term, see above
+  Real omega_plus;             ///< times 1/36
+  Real keep_rest;              ///< 1 - omega_plus
+  Real keep_plus, keep_minus;  ///< (1 - omega)/2: what is kept of f_i +- f_opposite
+  Real p_flux, p_force;        ///< p = p_flux j + p_force F
+  Real r_flux, r_force;        ///< r = (r_flux j + r_force F)/rho
+  Real a_flux, a_force;        ///< odd target a = a_flux j + a_force F
 
+  /// Rates of the even and odd parts; \p shift of the velocity in the force term, see above.
   static Relaxation make(double omega_plus, double omega_minus, double shift) {
-    return {Real(omega_plus), Real(omega_minus), Real((1 - omega_plus) / 2), Real((1 - omega_minus) / 2),
-            Real(shift)};
+    constexpr double w = 1.0 / 36;
+    const double alpha = std::sqrt(4.5 * omega_plus), beta = 4.5 / alpha;
+    const double square = beta * beta - 9 * shift, delta = square > 0 ? std::sqrt(square) : 0;
+    return {Real(w * omega_plus),
+            Real(1 - omega_plus),
+            Real((1 - omega_plus) / 2),
+            Real((1 - omega_minus) / 2),
+            Real(w * alpha),
+            Real(w * (beta - delta)),
+            Real(alpha),
+            Real(beta + delta),
+            Real(3 * w * omega_minus),
+            Real(3 * w)};
   }
 };
 
@@ -67,27 +92,26 @@ HEMO_HD HEMO_INLINE void collide(N (&f)[directions], const N& fx, const N& fy, c
   split_parities(f);
   const Moments<N> m = moments_of_parities(f);
   const N inverse_density = Real(1) / (Real(1) + m.density);
-  const N ux = m.x * inverse_density, uy = m.y * inverse_density, uz = m.z * inverse_density;
-  const N shift = rate.shift * inverse_density;
-  const N vx = ux + shift * fx, vy = uy + shift * fy, vz = uz + shift * fz;
-  // The even target is w (isotropic + (c.u)(c.h) + (c.F)(c.s)), the odd one w (c.a).
-  const N isotropic = rate.omega_plus * (m.density - Real(1.5) * (ux * m.x + uy * m.y + uz * m.z)) -
-                      Real(3) * (vx * fx + vy * fy + vz * fz);
-  const Real quadratic = Real(4.5) * rate.omega_plus;
-  const N hx = quadratic * m.x + Real(9) * fx, hy = quadratic * m.y + Real(9) * fy,
-          hz = quadratic * m.z + Real(9) * fz;
-  const N nine_shift = Real(9) * shift;
-  const N sx = nine_shift * fx, sy = nine_shift * fy, sz = nine_shift * fz;
-  const N ax = Real(3) * (rate.omega_minus * m.x + fx), ay = Real(3) * (rate.omega_minus * m.y + fy),
-          az = Real(3) * (rate.omega_minus * m.z + fz);
-  f[0] = Real(2) * rate.keep_plus * f[0] + Real(weight(0)) * isotropic;
+  const N px = rate.p_flux * m.x + rate.p_force * fx, py = rate.p_flux * m.y + rate.p_force * fy,
+          pz = rate.p_flux * m.z + rate.p_force * fz;
+  const N rx = (rate.r_flux * m.x + rate.r_force * fx) * inverse_density,
+          ry = (rate.r_flux * m.y + rate.r_force * fy) * inverse_density,
+          rz = (rate.r_flux * m.z + rate.r_force * fz) * inverse_density;
+  const N ax = rate.a_flux * m.x + rate.a_force * fx, ay = rate.a_flux * m.y + rate.a_force * fy,
+          az = rate.a_flux * m.z + rate.a_force * fz;
+  const N isotropic = rate.omega_plus * m.density - Real(1.0 / 3) * (px * rx + py * ry + pz * rz);
+  const N isotropic2 = isotropic + isotropic;
+  f[0] = rate.keep_rest * f[0] + Real(12) * isotropic;  // weight 1/3 = 12/36
   unroll<9>([&](auto pair) HEMO_INLINE_LAMBDA {
     constexpr int i = 2 * decltype(pair)::value + 1;
-    constexpr Real w = Real(weight(i));
-    const N target = (isotropic + along<i>(ux, uy, uz) * along<i>(hx, hy, hz)) +
-                     along<i>(fx, fy, fz) * along<i>(sx, sy, sz);
-    const N even = rate.keep_plus * f[i] + w * target;
-    const N odd = rate.keep_minus * f[i + 1] + w * along<i>(ax, ay, az);
+    constexpr bool axis = i < 7;  // weight 1/18 = 2/36
+    N even = along<i>(px, py, pz), odd = along<i>(ax, ay, az);
+    if constexpr (axis) {
+      even = even + even;
+      odd = odd + odd;
+    }
+    even = rate.keep_plus * f[i] + (even * along<i>(rx, ry, rz) + (axis ? isotropic2 : isotropic));
+    odd = rate.keep_minus * f[i + 1] + odd;
     f[i] = even + odd;
     f[i + 1] = even - odd;
   });

@@ -21,9 +21,8 @@ namespace detail {
 
 /// Loads the populations of W nodes from x on; lanes from \p active on are zero and are not touched in
 /// memory.
-template <Wall wall, bool whole, class Real, class N>
+template <Wall wall, bool whole, int W, class Real, class N>
 HEMO_INLINE void load_populations(const RowPointers<Real>& row, int x, int active, N (&f)[directions]) {
-  constexpr int W = lanes<Real>;
   const N index([](auto l) { return Real(int(l)); });
   const auto mask = index < Real(active);
   unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
@@ -58,13 +57,12 @@ HEMO_INLINE void prefetch(const Node* nodes) {
   for (std::size_t b = 0; b < W * sizeof(Node); b += 64) __builtin_prefetch(p + b, write, 3);
 }
 
-template <Wall wall, bool whole, class Real>
+template <Wall wall, bool whole, int W, class Real>
 HEMO_INLINE void collide_pack(const RowPointers<Real>& row, int x, int active, const Node4<Real>* force,
                               const Force3<Real>& body, const Relaxation<Real>& rate, double (&outgoing)[3]) {
-  constexpr int W = lanes<Real>;
   using N = Pack<Real, W>;
   N f[directions];
-  load_populations<wall, whole>(row, x, active, f);
+  load_populations<wall, whole, W>(row, x, active, f);
   N fx(body.x), fy(body.y), fz(body.z);
   if (force) {
     N x4, y4, z4;
@@ -89,12 +87,11 @@ HEMO_INLINE void collide_pack(const RowPointers<Real>& row, int x, int active, c
   });
 }
 
-template <Wall wall, bool whole, class Real>
+template <Wall wall, bool whole, int W, class Real>
 HEMO_INLINE void moments_pack(const RowPointers<Real>& row, int x, int active, Node4<Real>* velocity) {
-  constexpr int W = lanes<Real>;
   using N = Pack<Real, W>;
   N f[directions];
-  load_populations<wall, whole>(row, x, active, f);
+  load_populations<wall, whole, W>(row, x, active, f);
   split_parities(f);
   const Moments<N> m = moments_of_parities(f);
   const N inverse_density = Real(1) / (Real(1) + m.density);
@@ -111,25 +108,40 @@ HEMO_INLINE void moments_pack(const RowPointers<Real>& row, int x, int active, N
 
 }  // namespace detail
 
+/// body(pack width, whole, x, active) for packs that cover begin .. end-1. A rest of half or a quarter of a
+/// pack gets a pack of its size, any other rest a pack with idle lanes.
+template <class Real, class Body>
+HEMO_INLINE void for_packs(int begin, int end, Body&& body) {
+  constexpr int W = lanes<Real>;
+  using Yes = std::true_type;
+  int x = begin;
+  for (; x + W <= end; x += W) body(std::integral_constant<int, W>{}, Yes{}, x, W);
+  const int rest = end - x;
+  if (rest == 0) return;
+  if constexpr (W >= 4) {
+    if (rest == W / 2) return body(std::integral_constant<int, W / 2>{}, Yes{}, x, rest);
+    if (rest == W / 4) return body(std::integral_constant<int, W / 4>{}, Yes{}, x, rest);
+  }
+  body(std::integral_constant<int, W>{}, std::false_type{}, x, rest);
+}
+
 /// Collides nodes begin .. end-1 of a row in place. \p force (of the node x = 0; may be null) is read up to
 /// one pack beyond the last node: a field's halo planes lie there. \p outgoing gains the momentum that
 /// populations carry towards the wall.
 template <Wall wall, class Real>
 void collide_run(const RowPointers<Real>& row, int begin, int end, const Node4<Real>* force,
                  const Force3<Real>& body, const Relaxation<Real>& rate, double (&outgoing)[3]) {
-  constexpr int W = lanes<Real>;
-  int x = begin;
-  for (; x + W <= end; x += W) detail::collide_pack<wall, true>(row, x, W, force, body, rate, outgoing);
-  if (x < end) detail::collide_pack<wall, false>(row, x, end - x, force, body, rate, outgoing);
+  for_packs<Real>(begin, end, [&](auto width, auto whole, int x, int active) HEMO_INLINE_LAMBDA {
+    detail::collide_pack<wall, whole(), width()>(row, x, active, force, body, rate, outgoing);
+  });
 }
 
 /// u* and rho - 1 of nodes begin .. end-1 of a row.
 template <Wall wall, class Real>
 void moments_run(const RowPointers<Real>& row, int begin, int end, Node4<Real>* velocity) {
-  constexpr int W = lanes<Real>;
-  int x = begin;
-  for (; x + W <= end; x += W) detail::moments_pack<wall, true>(row, x, W, velocity);
-  if (x < end) detail::moments_pack<wall, false>(row, x, end - x, velocity);
+  for_packs<Real>(begin, end, [&](auto width, auto whole, int x, int active) HEMO_INLINE_LAMBDA {
+    detail::moments_pack<wall, whole(), width()>(row, x, active, velocity);
+  });
 }
 
 }  // namespace hemowalk::lbm
