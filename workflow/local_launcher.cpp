@@ -29,7 +29,7 @@ struct Active {
   clock::time_point started;
   std::unique_ptr<Child> child;
   int tries;
-  bool out_of_time = false;
+  bool out_of_time = false, told_to_stop = false;
 };
 
 /// What the child left behind, put right where it could not write its own end.
@@ -40,8 +40,9 @@ Status last_status(const Active& run, const Ending& ending, const std::string& f
     status.state = State::timed_out;
     status.reason = "over the time limit of " + format_duration(time_limit);
   } else if (ending.signal || !child_said_so) {
-    status.state =
-        ending.exit_code == static_cast<int>(Exit::interrupted) ? State::interrupted : State::failed;
+    const bool stopped = ending.exit_code == static_cast<int>(Exit::interrupted) ||
+                         (run.told_to_stop && ending.signal == SIGTERM);
+    status.state = stopped ? State::interrupted : State::failed;
     status.reason = describe(ending) + ", see log.txt";
   }
   if (ending.exit_code) status.exit_code = *ending.exit_code;
@@ -77,7 +78,7 @@ class Pool {
     while (!waiting_.empty() || !active_.empty()) {
       if (stop_requested() && !told) {
         told = stopping_ = true;
-        for (const auto& a : active_) a.child->signal(SIGTERM);
+        stop_children();
         log_info("stopping: the runs in progress write their checkpoints");
       }
       while (!stopping_ && !waiting_.empty() &&
@@ -96,6 +97,13 @@ class Pool {
     std::size_t job;
     int tries;
   };
+
+  void stop_children() {
+    for (auto& a : active_) {
+      a.told_to_stop = true;
+      a.child->signal(SIGTERM);
+    }
+  }
 
   void start_next() {
     const auto [j, tries] = waiting_.front();
@@ -146,7 +154,7 @@ class Pool {
     done_[j] = 1;
     if (options_.on_failure == OnFailure::abort) {
       stopping_ = true;
-      for (const auto& a : active_) a.child->signal(SIGTERM);
+      stop_children();
     }
   }
 

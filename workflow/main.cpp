@@ -12,7 +12,6 @@
 #include "core/provenance.hpp"
 #include "core/yaml/document.hpp"
 #include "workflow/command.hpp"
-#include "workflow/process.hpp"
 
 namespace hemowalk::workflow {
 namespace {
@@ -84,7 +83,6 @@ int run(int argc, char** argv) {
     if (argc > 1) check_verb(program, argv[1]);
     program.parse(argc, argv);
     if (session.flags.threads > 0) omp_set_num_threads(session.flags.threads);
-    catch_stop_signals();
     return session.action();
   } catch (const CLI::Success& asked) {  // --help, --version
     return program.exit(asked);

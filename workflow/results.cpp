@@ -36,6 +36,20 @@ struct ProfileMean {
   }
 };
 
+/// Standard deviation of posterior draws at each height; empty without draws.
+std::vector<double> spread_of(const std::vector<std::vector<double>>& draws, std::size_t heights) {
+  if (draws.size() < 2) return {};
+  std::vector<double> sigma(heights);
+  const double n = static_cast<double>(draws.size());
+  for (std::size_t y = 0; y < heights; ++y) {
+    double mean = 0, square = 0;
+    for (const auto& d : draws) mean += d.at(y) / n;
+    for (const auto& d : draws) square += (d.at(y) - mean) * (d.at(y) - mean);
+    sigma[y] = std::sqrt(square / (n - 1));
+  }
+  return sigma;
+}
+
 const char* name_of(coarse::Face::Type type) {
   switch (type) {
     case coarse::Face::Type::absorb:
@@ -197,6 +211,12 @@ Json calibration_json(const calibration::Calibration& result) {
                   {"D_sigma", finite(core.D_sigma)},
                   {"lag_s", finite(core.lag)},
                   {"y_range_m", finite(std::vector<double>(core.y_range.begin(), core.y_range.end()))}};
+  const auto& law = result.law.profile;
+  json["law_profile"] = {{"y_m", finite(law.y)},
+                         {"D_m2_per_s", finite(law.D)},
+                         {"sigma", finite(spread_of(law.D_draws, law.y.size()))},
+                         {"v_m_per_s", finite(law.v)},
+                         {"v_sigma", finite(spread_of(law.v_draws, law.y.size()))}};
   json["cell_free_layer_m"] = finite(result.law.cell_free_layer);
   return json;
 }

@@ -159,7 +159,11 @@ function localLaw() {
   const s = section("The local law across the gap"), grid = el("div", {class: "grid"}); s.append(grid);
   const chart = (title, note, label, scale, get, sigma, extra = {}) => {
     const series = with_profile.filter(([, , q]) => (q[get] || []).length).map(([p, i, q]) =>
-      ({name: many ? p.label : "measured", x: q.y_m, y: q[get], sigma: q[sigma], color: palette(i), width: 2}));
+      ({name: many ? p.label : "measured", x: q.y_m, y: q[get], sigma: q[sigma], color: palette(i), width: 1}));
+    with_profile.forEach(([p, i]) => {  // what the walks use: smooth, fitted through the walker's own propagator
+      const law = (calibrationOf(p) || {}).law_profile;
+      if (law && (law.y_m || []).length && (law[get] || []).length) series.push({name: many ? "law, " + p.label : "law", x: law.y_m, y: law[get], sigma: (law[sigma] || []).length ? law[sigma] : undefined, color: palette(i), width: 3});
+    });
     points.forEach((p, i) => { if (get === "D_m2_per_s" && p.truth) series.push({name: "truth", x: p.truth.y_m, y: p.truth.D_m2_per_s, color: css("--c5"), dash: [6, 5]}); });
     if (series.length) lineChart(grid, {title, note, x: {label: "distance from the lower wall y (µm)", scale: um}, y: {label, scale}, series, failed: anyFailed(), ...extra});
   };
@@ -204,7 +208,7 @@ function coarse() {
     if (one.absorbed_fraction.some(v => v > 0)) lineChart(grid, {title: "Absorbed fraction", x: {label: "time (s)"}, y: {label: "absorbed fraction", range: (lo, hi) => [0, Math.min(1, hi * 1.12)]}, series, failed: anyFailed()});
     const {y_m: y, c} = one.profile || {};
     if (y && c && c.length) {
-      const rows = one.time_s.map((_, t) => c.slice(t * y.length, (t + 1) * y.length));
+      const rows = c;
       if (one.time_s.length >= 12) heatMap(grid, {title: "Concentration", note: "Relative to the initial uniform one.", time: one.time_s, y, c: rows, xlabel: "time (s)", ylabel: "y (mm)", yscale: 1e3});
       else lineChart(grid, {title: "Concentration profiles", note: "Relative to the initial uniform one" + (group.length > 1 ? "; " + one.point : "") + ".", x: {label: "y (mm)", scale: 1e3}, y: {label: "c / c₀", range: (lo, hi) => [0, hi * 1.08]},
         series: one.time_s.map((t, k) => ({name: `t = ${scientific(t)} s`, x: y, y: rows[k], color: palette(k)}))});

@@ -1,6 +1,7 @@
 /// \file hemowalk coarse: a transport law and a device -> concentration and absorbed fraction
 
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include <filesystem>
 
@@ -9,13 +10,14 @@
 #include "core/log.hpp"
 #include "core/progress.hpp"
 #include "workflow/command.hpp"
+#include "workflow/process.hpp"
 
 namespace hemowalk::workflow {
 namespace {
 
 namespace fs = std::filesystem;
 
-int coarse_walk(const Flags& flags) {
+int coarse_walk(const Flags& flags, const std::string& method) {
   require(!flags.file.empty(), "coarse needs a case (coarse.yaml) give its file: hemowalk coarse FILE");
   const auto the_case = coarse::read_case(flags.file, overrides(flags));
   const auto law = the_case.constant_D ? data::TransportLaw::constant(*the_case.constant_D)
@@ -23,7 +25,13 @@ int coarse_walk(const Flags& flags) {
   Progress progress(the_case.name);
   coarse::RunOptions options;
   options.strict = flags.strict;
-  options.progress = [&](double fraction) { progress.update(fraction); };
+  options.fokker_planck = method == "fokker_planck";
+  options.progress = [&](double fraction) {
+    progress.update(fraction);
+    if (stop_requested())
+      throw Interrupted("stopped by a signal (a walk keeps no checkpoint) start it again");
+  };
+  catch_stop_signals();
   const auto result = coarse::run(the_case, law, options);
   for (const auto& w : result.warnings) log_warning(w);
 
@@ -49,10 +57,14 @@ int coarse_walk(const Flags& flags) {
 }  // namespace
 
 void add_coarse(CLI::App& program, Session& session) {
-  add_verb(
+  auto method = std::make_shared<std::string>("walk");
+  auto* verb = add_verb(
       program, session, "coarse", "transport law + device -> concentration, absorbed fraction",
       takes_file | takes_set | takes_out | takes_threads | takes_seed | takes_strict,
-      [&session] { return coarse_walk(session.flags); }, "coarse.yaml");
+      [&session, method] { return coarse_walk(session.flags, *method); }, "coarse.yaml");
+  verb->add_option("--method", *method, "walk (default) or fokker_planck, its equation without noise")
+      ->check(CLI::IsMember({"walk", "fokker_planck"}))
+      ->type_name("NAME");
 }
 
 }  // namespace hemowalk::workflow

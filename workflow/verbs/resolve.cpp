@@ -74,6 +74,7 @@ resolved::RunSummary run_with_status(const data::Scene& scene, const std::string
 
 int resolve(const Flags& flags, bool resume) {
   require(!flags.file.empty(), "resolve needs a scene (scene.yaml) give its file: hemowalk resolve FILE");
+  catch_stop_signals();
   const auto scene = data::read_scene(flags.file, overrides(flags));
   require_feasible(scene, flags.file);
   const std::string folder = flags.out.empty() ? "out/" + scene.input_sha256.substr(0, 12) : flags.out;

@@ -8,6 +8,7 @@
 #include "workflow/command.hpp"
 #include "workflow/pipeline.hpp"
 #include "workflow/plan.hpp"
+#include "workflow/process.hpp"
 
 namespace hemowalk::workflow {
 namespace {
@@ -30,6 +31,7 @@ int run(const Session& session) {
   PipelineOptions options;
   options.strict = flags.strict;
   options.command = typed(session.arguments);
+  catch_stop_signals();
   const auto summary = run_pipeline(campaign, options);
 
   const bool refused = flags.strict && !summary.gate_passed;
