@@ -398,9 +398,11 @@ void Simulation<Real>::predict() {
                 u = {w[0], w[1], w[2], Real(0)};
                 const Real force[3] = {F.x + couple_force_[at], F.y + couple_force_[at + lanes],
                                        F.z + couple_force_[at + 2 * lanes]};
-                for (int d = 0; d < 3; ++d)
-                  predicted[vector + d * lanes + l] =
-                      (m * velocities[vector + d * lanes + l] + h * (a * w[d] + force[d])) * inverse_metric;
+                for (int d = 0; d < 3; ++d) {
+                  // As an increment over w: rounding then touches a small number and momentum does not drift.
+                  const Real v = velocities[vector + d * lanes + l];
+                  predicted[vector + d * lanes + l] = w[d] + (m * (v - w[d]) + h * force[d]) * inverse_metric;
+                }
               }
             }
         },
