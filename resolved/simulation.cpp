@@ -442,10 +442,13 @@ void Simulation<Real>::impulses() {
               const std::size_t slot = group.first_marker + scalar;
               const Real a = static_cast<Real>(group.weight[k]);
               const Real* v = velocities + 3 * scalar;
+              const int used = std::min(lanes, cells.count() - b * lanes);
               for (int l = 0; l < lanes; ++l) {
                 const Node4<Real> w = reading_[slot + l];
-                impulse_[slot + l] = {a * (v[l] - w.x), a * (v[lanes + l] - w.y),
-                                      a * (v[2 * lanes + l] - w.z), Real(0)};
+                const Node4<Real> none{0, 0, 0, 0};  // idle lanes give nothing
+                impulse_[slot + l] = l < used ? Node4<Real>{a * (v[l] - w.x), a * (v[lanes + l] - w.y),
+                                                            a * (v[2 * lanes + l] - w.z), 0}
+                                              : none;
               }
             }
         },
