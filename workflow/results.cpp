@@ -224,7 +224,8 @@ Json calibration_json(const calibration::Calibration& result) {
 Json coarse_json(const coarse::Result& result, const coarse::Case& the_case, const data::TransportLaw& law) {
   Json json;
   json["name"] = the_case.name;
-  for (auto& [key, value] : Json::parse(coarse::to_json(result, the_case)).items())
+  const auto contract = Json::parse(coarse::to_json(result, the_case));
+  for (const auto& [key, value] : contract.items())
     if (key != "name") json[key] = value;
   json["case"] = {{"height_m", the_case.height},
                   {"bottom", name_of(the_case.bottom.type)},

@@ -47,11 +47,14 @@ function tick(value) {
   return Number(value.toPrecision(6)).toString();
 }
 
+// On every figure whose trajectories failed the artefact gate: for which of them.
+const failedBadge = names => names ? el("div", {class: "failed", title: names}, "artefact gate failed: " + names) : null;
+
 // spec: {title, note, x: {label, scale, log}, y: {label, scale, log, range}, marks: [{from, to, label}],
 //        series: [{name, x, y, lo, hi, sigma, color, dash, width, points, line}], hlines: [{at, label}]}
 function lineChart(parent, spec) {
   const xs = spec.x.scale || 1, ys = spec.y.scale || 1;
-  const card = el("div", {class: "card chart" + (spec.failed ? " failed" : "")}, el("h3", {}, spec.title));
+  const card = el("div", {class: "card chart"}, failedBadge(spec.failed), el("h3", {}, spec.title));
   if (spec.note) card.append(el("p", {class: "note"}, spec.note));
   const legend = el("div", {class: "legend"}), box = el("div"), readout = el("div", {class: "readout"}, " ");
   card.append(legend, box, readout);
@@ -82,7 +85,7 @@ function lineChart(parent, spec) {
     }
     tables.push(table);
     const mark = el("i", {class: s.line === false ? "dot" : s.dash ? "dashed" : "", style: s.line === false ? `background:${color}` : `border-color:${color}`});
-    legend.append(el("span", {}, mark, s.name + (lo && hi && s.band !== false ? " ± 1σ" : "")));
+    if (s.legend !== false) legend.append(el("span", {}, mark, s.name + (lo && hi && s.band !== false ? " ± 1σ" : "")));
     options[base].shown = s;
   });
   if (!tables.length) { box.append(el("p", {class: "note"}, "no data")); return; }
@@ -141,7 +144,7 @@ function lineChart(parent, spec) {
 
 // rows: [{label, value, lo, hi, ours, soft}] on a logarithmic axis
 function forestPlot(parent, {title, note, unit, rows, failed}) {
-  const card = el("div", {class: "card chart" + (failed ? " failed" : "")}, el("h3", {}, title));
+  const card = el("div", {class: "card chart"}, failedBadge(failed), el("h3", {}, title));
   if (note) card.append(el("p", {class: "note"}, note));
   const width = 1060, label = 400, right = 150, row = 27, top = 10, height = top + rows.length * row + 46;
   const all = rows.flatMap(r => [r.lo, r.value, r.hi]).filter(v => v > 0).map(Math.log10);
@@ -188,14 +191,15 @@ function heatMap(parent, {title, note, time, y, c, xlabel, ylabel, yscale}) {
     const stops = [[38, 20, 72], [44, 62, 140], [26, 122, 142], [62, 175, 118], [180, 210, 62], [253, 231, 80]];
     const p = t * 5, i = Math.min(4, Math.floor(p)), f = p - i;
     return `rgb(${[0, 1, 2].map(k => Math.round(stops[i][k] * (1 - f) + stops[i + 1][k] * f)).join(",")})`; };
-  const tw = w / time.length, yh = h / y.length;
+  // Each column reaches half-way to its neighbours: the axis is linear in time whatever the output times.
+  const last = time[time.length - 1], yh = h / y.length, px = t => left + w * t / last;
+  const edge = k => k === 0 ? 0 : k === time.length ? last : (time[k - 1] + time[k]) / 2;
   for (let t = 0; t < time.length; ++t) for (let k = 0; k < y.length; ++k) {
     ctx.fillStyle = color(c[t][k]);
-    ctx.fillRect(left + t * tw, 8 + h - (k + 1) * yh, tw + .6, yh + .6);
+    ctx.fillRect(px(edge(t)), 8 + h - (k + 1) * yh, px(edge(t + 1)) - px(edge(t)) + .6, yh + .6);
   }
   ctx.fillStyle = css("--soft"); ctx.font = "11.5px system-ui, sans-serif"; ctx.textAlign = "center";
-  const every = Math.ceil(time.length / 8);
-  time.forEach((t, i) => { if (i % every === 0) ctx.fillText(tick(t), left + (i + .5) * tw, 8 + h + 16); });
+  for (let k = 0; k <= 5; ++k) ctx.fillText(tick(Number((last * k / 5).toPrecision(3))), px(last * k / 5), 8 + h + 16);
   ctx.fillText(xlabel, left + w / 2, 8 + h + 34);
   ctx.textAlign = "right";
   const yt = y.map(v => v * yscale), span = yt[yt.length - 1] + yt[0];

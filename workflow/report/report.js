@@ -10,10 +10,10 @@ const um = 1e6, ms = 1e3, umSquared = 1e12;  // m -> um, s -> ms, m2 -> um2
 
 const calibrationOf = (p, k = kind) => (p.calibrations || {})[k];
 const failed = c => c && c.gate && c.gate.passed === false;
-const anyFailed = () => points.some(p => failed(calibrationOf(p)));
+const anyFailed = () => { const bad = points.filter(p => failed(calibrationOf(p))); return bad.length ? (many ? bad.map(p => p.label).join(", ") : "these trajectories") : ""; };
 const kindName = k => ({platelet: "platelets", rbc: "red blood cells"})[k] || k;
 const section = title => { const s = el("section", {}, el("h2", {}, title)); page.append(s); return s; };
-const seconds = s => !isNumber(s) ? "–" : s < 1 ? (s * 1e3).toFixed(0) + " ms" : s < 120 ? Number(s.toPrecision(3)) + " s" :
+const seconds = s => !isNumber(s) ? "–" : s < .9995 ? (s * 1e3).toFixed(0) + " ms" : s < 120 ? Number(s.toPrecision(3)) + " s" :
   s < 7200 ? (s / 60).toFixed(1) + " min" : (s / 3600).toFixed(1) + " h";
 
 // One value with its error, in powers of ten that fit: "1.25 ± 0.05 × 10⁻¹⁰ m²/s"
@@ -21,6 +21,28 @@ function withError(value, sigma, unit) {
   if (!isNumber(value)) return "–";
   const power = value ? Math.floor(Math.log10(Math.abs(value))) : 0, scale = 10 ** power;
   return `${digits(value / scale, sigma / scale)} ± ${digits(sigma / scale, sigma / scale)} × 10${superscript(power)} ${unit}`;
+}
+
+// Synthetic trajectories: the true D averaged over the layer in which the analysed displacements start.
+function againstTruth(p) {
+  const core = (calibrationOf(p) || {}).core, {y_m: y, D_m2_per_s: D} = p.truth;
+  if (!core || !core.y_range_m || !isNumber(core.y_range_m[0])) return "";
+  const inside = D.filter((_, k) => y[k] >= core.y_range_m[0] && y[k] <= core.y_range_m[1]), mean = inside.reduce((a, b) => a + b, 0) / inside.length;
+  return `the trajectories were generated with D = ${scientific(mean)} m²/s in this layer; found ${withError(core.D_m2_per_s, core.D_sigma, "m²/s")}, ` +
+         `${Math.abs((core.D_m2_per_s - mean) / core.D_sigma).toFixed(1)} standard errors away.`;
+}
+
+// Which sources measured under matching conditions agree within two standard errors, and which do not.
+function againstLiterature(p) {
+  const verdicts = (calibrationOf(p) || {}).verdict || [], matched = verdicts.filter(v => v.matched_conditions);
+  if (!verdicts.length) return "";
+  if (!matched.length) return "no published value was measured under these conditions; those that come near stand in the chart below.";
+  const named = v => v.source.replace(/_/g, " "), times = v => (calibrationOf(p).core.D_m2_per_s / v.D_m2_per_s).toFixed(1) + " times theirs";
+  const parts = [["within two standard errors of ", v => isNumber(v.z) && Math.abs(v.z) < 2, v => `${named(v)} (${Math.abs(v.z).toFixed(1)})`],
+                 ["not of ", v => isNumber(v.z) && Math.abs(v.z) >= 2, v => `${named(v)} (${Math.abs(v.z).toFixed(1)} standard errors, ours is ${times(v)})`],
+                 ["no error is known for ", v => !isNumber(v.z), v => `${named(v)} (ours is ${times(v)})`]]
+    .map(([words, test, text]) => matched.filter(test).length ? words + matched.filter(test).map(text).join(", ") : "").filter(t => t);
+  return "of the sources under matching conditions, D is " + parts.join("; ") + "." + (failed(calibrationOf(p)) ? " The artefact gate failed: agreement proves nothing." : "");
 }
 
 function headline() {
@@ -43,18 +65,15 @@ function headline() {
       el("small", {}, ` ± ${digits(core.D_sigma / scale, core.D_sigma / scale)} × 10${superscript(power)} m²/s`));
     const relative = core.D_sigma / core.D_m2_per_s;
     heads.append(el("div", {class: "card head"}, el("div", {class: "of"}, `D of ${kindName(k)}, wall-normal${many ? " · " + p.label : ""}`), value,
-      el("div", {class: "ci"}, `${scientific(core.D_m2_per_s * umSquared)} µm²/s · ${core.y_range_m && isNumber(core.y_range_m[0]) ? `start at y = ${digits(core.y_range_m[0] * um)}–${digits(core.y_range_m[1] * um)} µm, lag ${digits(core.lag_s * ms)} ms` : "core"} · ${c.n_platelets} ${kindName(k)}` +
+      el("div", {class: "ci"}, `${scientific(core.D_m2_per_s * umSquared)} µm²/s · ${core.y_range_m && isNumber(core.y_range_m[0]) ? `start at y = ${digits(core.y_range_m[0] * um)}–${digits(core.y_range_m[1] * um)} µm, ${core.lag_s > 0 ? `lag ${digits(core.lag_s * ms)} ms` : `estimator: ${((c.law || {}).core_estimator || "core").replace(/_/g, " ")}`}` : "core"} · ${c.n_platelets} ${kindName(k)}` +
         (p.runs && p.runs.length > 1 ? ` in ${p.runs.length} independent runs` : "") +
         (relative > .3 ? ` · wide: ±${Math.round(relative * 100)} %, too few cells or too short a run for more` : ""))));
   }
   page.append(heads);
   if (results.truth) page.append(el("div", {class: "banner ok"}, results.truth));
-  // One sentence per point: the source measured under the same conditions, or that there is none.
   for (const p of points) {
-    const verdicts = ((calibrationOf(p) || {}).verdict || []).filter(v => v.statement);
-    const matched = verdicts.filter(v => v.matched_conditions);
-    if (verdicts.length) page.append(el("p", {class: "verdict"}, many ? el("strong", {}, p.label + ": ") : null,
-      matched.length ? matched[0].statement : "no published value was measured under these conditions; those that come near stand in the chart below."));
+    const text = p.truth ? againstTruth(p) : againstLiterature(p);
+    if (text) page.append(el("p", {class: "verdict"}, many ? el("strong", {}, p.label + ": ") : null, text));
   }
   page.append(el("p", {class: "note", style: "color:var(--soft);font-size:13px"},
     "D measures the wall-normal spreading in the red-cell-rich layer at the stated shear rate and hematocrit. Interior viscosity contrast is not modelled; " +
@@ -131,26 +150,28 @@ function msdCharts() {
 }
 
 function literature() {
+  const real = points.filter(p => calibrationOf(p) && !p.truth);  // synthetic trajectories have a truth, no literature
   const rows = [], estimates = {paper: "the paper's estimator", paper_all: "the paper's, all cells", plateau: "plateau", gls: "generalised least squares", green_kubo: "Green-Kubo", confined: "plateau, confinement allowed for", without_jumps: "plateau, jumps removed"};
   points.forEach(p => {
     const c = calibrationOf(p);
-    if (!c) return;
+    if (!c || p.truth) return;
+    const shown = real.length > 1 ? ["paper", (c.law || {}).core_estimator || "plateau"] : Object.keys(c.estimators || {});
     for (const [name, e] of Object.entries(c.estimators || {}))
-      if (isNumber(e.D_m2_per_s) && e.D_m2_per_s > 0) {
+      if (shown.includes(name) && isNumber(e.D_m2_per_s) && e.D_m2_per_s > 0) {
         const [lo, hi] = e.ci68 && isNumber(e.ci68[0]) ? e.ci68 : [e.D_m2_per_s - e.sigma, e.D_m2_per_s + e.sigma];
-        rows.push({label: `this work · ${many ? p.label + " · " : ""}${estimates[name] || name}`, value: e.D_m2_per_s, lo, hi, ours: true});
+        rows.push({label: `this work · ${real.length > 1 ? p.label + " · " : ""}${estimates[name] || name}`, value: e.D_m2_per_s, lo, hi, ours: true});
       }
   });
-  const first = points.map(p => calibrationOf(p)).find(c => c && c.verdict && c.verdict.length);
+  const first = real.map(p => calibrationOf(p)).find(c => c && c.verdict && c.verdict.length);
   const published = first ? first.verdict.filter(v => isNumber(v.D_m2_per_s)) : [];
-  published.forEach(v => rows.push({label: v.source + (v.matched_conditions ? "" : " (other conditions)"), value: v.D_m2_per_s, lo: v.D_lo, hi: v.D_hi, soft: !v.matched_conditions}));
-  if (!rows.length) return;
+  published.forEach(v => rows.push({label: v.source.replace(/_/g, " ") + (v.matched_conditions ? "" : " (other conditions)"), value: v.D_m2_per_s, lo: v.D_lo, hi: v.D_hi, soft: !v.matched_conditions}));
+  if (!rows.length || !real.length) return;
   const s = section("D beside the literature");
   forestPlot(s, {title: `Diffusion coefficient of ${kindName(kind)}`, unit: "D (m²/s)", rows, failed: anyFailed(),
     note: "Diamonds: this campaign with 68 % intervals. Circles: published values with their range where one is given; pale where shear, hematocrit, direction or particle differ."});
-  const said = points.flatMap(p => ((calibrationOf(p) || {}).verdict || []).filter(v => v.statement).map(v => [p, v]));
-  if (said.length) s.append(el("details", {open: ""}, el("summary", {}, "In words"), el("ul", {class: "verdicts"},
-    said.map(([p, v]) => el("li", {}, (many ? p.label + ": " : "") + v.statement)))));
+  const said = real.flatMap(p => (calibrationOf(p).verdict || []).filter(v => v.statement).map(v => [p, v]));
+  if (said.length) s.append(el("details", real.length > 1 ? {} : {open: ""}, el("summary", {}, "In words"), el("ul", {class: "verdicts"},
+    said.map(([p, v]) => el("li", {}, (real.length > 1 ? p.label + ": " : "") + v.statement)))));
 }
 
 function localLaw() {
@@ -162,12 +183,12 @@ function localLaw() {
       ({name: many ? p.label : "measured", x: q.y_m, y: q[get], sigma: q[sigma], color: palette(i), width: 1}));
     with_profile.forEach(([p, i]) => {  // what the walks use: smooth, fitted through the walker's own propagator
       const law = (calibrationOf(p) || {}).law_profile;
-      if (law && (law.y_m || []).length && (law[get] || []).length) series.push({name: many ? "law, " + p.label : "law", x: law.y_m, y: law[get], sigma: (law[sigma] || []).length ? law[sigma] : undefined, color: palette(i), width: 3});
+      if (law && (law.y_m || []).length && (law[get] || []).length) series.push({name: "thick: the smooth law", legend: series.every(q => q.width !== 3), x: law.y_m, y: law[get], sigma: (law[sigma] || []).length ? law[sigma] : undefined, color: palette(i), width: 3});
     });
-    points.forEach((p, i) => { if (get === "D_m2_per_s" && p.truth) series.push({name: "truth", x: p.truth.y_m, y: p.truth.D_m2_per_s, color: css("--c5"), dash: [6, 5]}); });
+    points.forEach((p, i) => { if (get === "D_m2_per_s" && p.truth) series.push({name: "truth", legend: series.every(q => q.name !== "truth"), x: p.truth.y_m, y: p.truth.D_m2_per_s, color: css("--c5"), dash: [6, 5]}); });
     if (series.length) lineChart(grid, {title, note, x: {label: "distance from the lower wall y (µm)", scale: um}, y: {label, scale}, series, failed: anyFailed(), ...extra});
   };
-  chart("D(y)", "Kramers-Moyal at the plateau lag; biased low within about 2 µm of a wall.", "D (10⁻¹⁰ m²/s)", 1e10, "D_m2_per_s", "sigma");
+  chart("D(y)", "Thin: Kramers-Moyal at the plateau lag, biased low within about 2 µm of a wall. Thick: the smooth law, fitted through the walker's own propagator.", "D (10⁻¹⁰ m²/s)", 1e10, "D_m2_per_s", "sigma");
   chart("Drift v(y)", "Without the gradient of D: the flux is J = v c − D c′.", "v (µm/s)", um, "v_m_per_s", "v_sigma", {hlines: [{at: 0, label: ""}]});
   chart("Where the cells are", "Density of the analysed cells, all samples after the transient.", "density (1/µm)", 1e-6, "density_1_per_m");
 }
@@ -201,15 +222,16 @@ function coarse() {
     s.append(el("h3", {style: "margin:6px 0 8px"}, name.replace(/_/g, " ") + (one.case ? ` — layer of ${scientific(one.case.height_m * 1e3)} mm, bottom: ${one.case.bottom}, top: ${one.case.top}, ${scientific(one.walkers)} walkers` : "")), grid);
     const series = [];
     group.forEach((c, i) => {
+      const who = group.length > 1 ? c.point + ": " : "";
       const total = c.absorbed_sigma.map((v, k) => Math.hypot(v || 0, (c.absorbed_law_sigma || [])[k] || 0));
-      series.push({name: "walkers" + (group.length > 1 ? ", " + c.point : "") + " (bars: sampling and law)", x: c.time_s, y: c.absorbed_fraction, sigma: total, points: true, line: false, color: palette(i)});
-      if (c.exact) series.push({name: `exact series, D = ${scientific(c.exact.D_m2_per_s)}` + (c.exact.same_problem ? "" : " (constant D, for comparison)"), x: c.exact.time_s, y: c.exact.absorbed_fraction, color: palette(i), dash: c.exact.same_problem ? undefined : [6, 5]});
+      series.push({name: who + "walkers", x: c.time_s, y: c.absorbed_fraction, sigma: total, points: true, line: false, color: palette(i)});
+      if (c.exact) series.push({name: `exact, D = ${scientific(c.exact.D_m2_per_s)}`, x: c.exact.time_s, y: c.exact.absorbed_fraction, color: palette(i), dash: c.exact.same_problem ? undefined : [6, 5]});
     });
-    if (one.absorbed_fraction.some(v => v > 0)) lineChart(grid, {title: "Absorbed fraction", x: {label: "time (s)"}, y: {label: "absorbed fraction", range: (lo, hi) => [0, Math.min(1, hi * 1.12)]}, series, failed: anyFailed()});
+    if (one.absorbed_fraction.some(v => v > 0)) lineChart(grid, {title: "Absorbed fraction", note: "Bars: sampling of the walkers and uncertainty of the law together. " + (group.every(c => !c.exact || c.exact.same_problem) ? "Line: the exact series." : "Dashed: the exact series for one constant D, that of the core, for comparison."), x: {label: "time (s)"}, y: {label: "absorbed fraction", range: (lo, hi) => [0, Math.min(1, hi * 1.12)]}, series, failed: anyFailed()});
     const {y_m: y, c} = one.profile || {};
     if (y && c && c.length) {
       const rows = c;
-      if (one.time_s.length >= 12) heatMap(grid, {title: "Concentration", note: "Relative to the initial uniform one.", time: one.time_s, y, c: rows, xlabel: "time (s)", ylabel: "y (mm)", yscale: 1e3});
+      if (one.time_s.length >= 12) heatMap(grid, {title: "Concentration", note: "Relative to the initial uniform one" + (group.length > 1 ? "; " + one.point : "") + ".", time: one.time_s, y, c: rows, xlabel: "time (s)", ylabel: "y (mm)", yscale: 1e3});
       else lineChart(grid, {title: "Concentration profiles", note: "Relative to the initial uniform one" + (group.length > 1 ? "; " + one.point : "") + ".", x: {label: "y (mm)", scale: 1e3}, y: {label: "c / c₀", range: (lo, hi) => [0, hi * 1.08]},
         series: one.time_s.map((t, k) => ({name: `t = ${scientific(t)} s`, x: y, y: rows[k], color: palette(k)}))});
     }
@@ -265,7 +287,13 @@ function draw() {
   page.textContent = "";
   drawn.length = 0;
   document.title = (results.title || results.name || "campaign") + " · hemowalk";
-  for (const part of [headline, conditions, msdCharts, literature, localLaw, blood, coarse, diagnostics, runs, warnings, reproduce]) part();
+  for (const part of [headline, conditions, msdCharts, literature, localLaw, blood, coarse, diagnostics, runs, warnings, reproduce]) {
+    try { part(); }
+    catch (error) {  // one section that fails must not take the others with it, but it is said and counted
+      window.pageErrors.push(part.name + ": " + error.message);
+      page.append(el("div", {class: "banner bad"}, `This section could not be drawn (${part.name}: ${error.message}).`));
+    }
+  }
 }
 draw();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
