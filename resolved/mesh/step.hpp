@@ -5,7 +5,7 @@ namespace hemowalk::mesh {
 
 struct StepOptions {
   int iterations = 1;             ///< quasi-Newton iterations (membranes)
-  bool damping = true;            ///< kappa damping after the solve (membranes)
+  bool damping = true;            ///< kappa damping (membranes)
   bool measure_residual = false;  ///< one more force evaluation, fills StepReport::residual (membranes)
 };
 

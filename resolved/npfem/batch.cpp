@@ -2,8 +2,6 @@
 
 #include <cstring>
 
-#include "resolved/mesh/rigid_motion.hpp"
-
 namespace hemowalk::npfem {
 namespace {
 
@@ -48,9 +46,9 @@ Tables<Real>::Tables(const CellType& type)
       damped(type.material().drag_per_area > 0) {
   const auto real = [](double x) { return static_cast<Real>(x); };
   double total = 0;
-  for (double m : type.metric()) {
-    total += m;
-    mass_rate.push_back(real(m / (type.h() * type.h())));
+  for (int k = 0; k < vertices; ++k) {
+    total += type.metric()[k];
+    mass_rate.push_back(real(type.metric()[k] / (type.h() * type.h() * (1 - type.kappa()[k]))));
   }
   total_metric = real(total);
   stiff_volume = material.volume_modulus > 0.5 * total / vertices / (type.h() * type.h());
@@ -225,11 +223,36 @@ void BatchKernel<Real>::forces(const BatchFields<Real>& b) {
 }
 
 template <class Real>
-[[gnu::flatten]] auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b) -> P {
+[[gnu::flatten]] auto BatchKernel<Real>::find_frame(const BatchFields<Real>& b) -> Frame {
+  mesh::Inertia<P> inertia;
+  mesh::Momentum<P> momentum;
+  for_chunks(t_.vertices, [&](int begin, int end) {
+    mesh::Inertia<P> i;
+    mesh::Momentum<P> p;
+    for (int k = begin; k < end; ++k) {
+      const V r = load3(b.offset, k);
+      i.add(t_.metric[k], r);
+      p.add(t_.metric[k], r, load3(b.predicted, k));
+    }
+    inertia.add(i), momentum.add(p);
+  });
+  const mesh::Body<P> body(P(t_.total_metric), inertia);
+  return {body, body.motion(momentum)};
+}
+
+template <class Real>
+[[gnu::flatten]] auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b, const Frame& frame,
+                                                   bool damping) -> P {
   const P p = membrane_forces(b.offset);
   P square(0);
   for (int k = 0; k < t_.vertices; ++k) {
-    const V inertia = t_.mass_rate[k] * (t_.h * load3(b.predicted, k) - load3(s_.increment.data(), k));
+    V wanted = load3(b.predicted, k);
+    Real rate = t_.mass_rate[k];
+    if (damping)
+      wanted = wanted + t_.kappa[k] * (frame.at(load3(b.offset, k)) - wanted);
+    else
+      rate *= 1 - t_.kappa[k];
+    const V inertia = rate * (t_.h * wanted - load3(s_.increment.data(), k));
     square += dot(inertia, inertia);
     add3(inertia - p * load3(s_.gradient.data(), k), s_.force.data(), k);
   }
@@ -300,45 +323,23 @@ template <class Real>
   return change / max(total, P(Real(1e-30)));
 }
 
-/// v from d/h: kappa damping of the part that is no rigid motion, then the rigid motion that gives the body
-/// exactly the linear and angular momentum (about x^n) of v_pred: internal forces change neither, converged
-/// or not.
+/// v = d/h, with its rigid part replaced by that of v_pred: internal forces change neither the linear nor the
+/// angular momentum (about x^n), whether the iteration has converged or not.
 template <class Real>
-[[gnu::flatten]] void BatchKernel<Real>::damp_and_project(const BatchFields<Real>& b, bool damping) {
-  mesh::Inertia<P> inertia;
-  mesh::Momentum<P> wanted, solved;
-  for_chunks(t_.vertices, [&](int begin, int end) {
-    mesh::Inertia<P> i;
-    mesh::Momentum<P> w, s;
-    for (int k = begin; k < end; ++k) {
-      const V r = load3(b.offset, k), v = t_.inverse_h * load3(s_.increment.data(), k);
-      store3(v, b.solution, k);
-      i.add(t_.metric[k], r);
-      w.add(t_.metric[k], r, load3(b.predicted, k));
-      s.add(t_.metric[k], r, v);
-    }
-    inertia.add(i), wanted.add(w), solved.add(s);
-  });
-  const mesh::Body<P> body(P(t_.total_metric), inertia);
-  const V c = body.centre();
-  const auto before = body.motion(solved);
-  mesh::Momentum<P> left;  // of the damped part, about the centre
+[[gnu::flatten]] void BatchKernel<Real>::project(const BatchFields<Real>& b, const Frame& frame) {
+  mesh::Momentum<P> solved;
   for_chunks(t_.vertices, [&](int begin, int end) {
     mesh::Momentum<P> part;
-    for (int k = begin; k < end; ++k) {
-      const V r = load3(b.offset, k) - c;
-      V u = load3(b.solution, k) - (before.velocity + cross(before.spin, r));
-      if (damping) u = (1 - t_.kappa[k]) * u;
-      store3(u, b.velocity, k);
-      part.add(t_.metric[k], r, u);
-    }
-    left.add(part);
+    for (int k = begin; k < end; ++k)
+      part.add(t_.metric[k], load3(b.offset, k), t_.inverse_h * load3(s_.increment.data(), k));
+    solved.add(part);
   });
-  const mesh::Momentum<P> rigid{wanted.linear - left.linear,
-                                (wanted.angular - cross(c, wanted.linear)) - left.angular};
-  const auto after = body.motion_about_centre(rigid);
+  const auto was = frame.body.motion(solved);
+  const V velocity = frame.motion.velocity - was.velocity, spin = frame.motion.spin - was.spin;
   for (int k = 0; k < t_.vertices; ++k)
-    add3(after.velocity + cross(after.spin, load3(b.offset, k) - c), b.velocity, k);
+    store3(t_.inverse_h * load3(s_.increment.data(), k) +
+               (velocity + cross(spin, load3(b.offset, k) - frame.body.centre())),
+           b.velocity, k);
 }
 
 /// x += h v. The mean goes into the double anchor, the rest into offset + residual without loss.
@@ -392,21 +393,23 @@ template <class Real>
 
 template <class Real>
 auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions& options) -> Report {
-  // Start where the last step's solution points: what is wrong with the stand-in then acts on dv/dt only.
-  // Starting from v_pred instead would let the stand-in resist the motion itself.
+  // Start from the last velocity: what is wrong with the stand-in then acts on dv/dt only. Starting from
+  // v_pred instead would let the stand-in resist the motion itself.
   for (int k = 0; k < t_.vertices; ++k) {
-    const V d = t_.h * load3(b.solution, k);
+    const V d = t_.h * load3(b.velocity, k);
     store3(d, s_.increment.data(), k);
     store3(load3(b.residual, k) + d, s_.moved.data(), k);
   }
+  const bool damping = options.damping && t_.damped;
+  const Frame frame = find_frame(b);
   Report report{P(0), P(0), P(0)};
   for (int i = 0; i < options.iterations; ++i) {
-    unbalance(b);
+    unbalance(b, frame, damping);
     t_.stiff_volume ? solve_with_volume() : solve(s_.force.data());
     report.increment = correct(b);
   }
   if (options.measure_residual) {
-    const P scale = unbalance(b);
+    const P scale = unbalance(b, frame, damping);
     P square(0);
     for (int k = 0; k < t_.vertices; ++k) {
       const V r = load3(s_.force.data(), k);
@@ -415,7 +418,7 @@ auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions
     using std::max;
     report.residual = square / max(scale, P(Real(1e-30)));
   }
-  damp_and_project(b, options.damping && t_.damped);
+  project(b, frame);
   report.probe = move(b);
   update_normals(b);
   return report;

@@ -7,6 +7,7 @@
 #include "core/array.hpp"
 #include "core/simd.hpp"
 #include "resolved/mesh/lanes.hpp"
+#include "resolved/mesh/rigid_motion.hpp"
 #include "resolved/mesh/step.hpp"
 #include "resolved/npfem/cell_type.hpp"
 #include "resolved/npfem/terms/edge_bending.hpp"
@@ -47,7 +48,7 @@ struct Tables {
   Material material;
   std::vector<TriangleRow> triangles;
   std::vector<EdgeRow> edges;
-  std::vector<Real> metric, mass_rate, kappa;  ///< m, m/h^2, kappa of every vertex
+  std::vector<Real> metric, mass_rate, kappa;  ///< m, m/(h^2 (1 - kappa)), kappa of every vertex
   std::vector<int> order, row_begin, row_index, column_begin, column_index;  ///< SparseFactor
   std::vector<Real> row_value, column_value, inverse_diagonal;
   std::vector<int> lap_begin, lap_index;  ///< full rows of Lap (Rayleigh damping)
@@ -78,7 +79,6 @@ struct BatchFields {
   double* anchor;           ///< [3][lane]
   Real *offset, *residual;  ///< position = anchor + offset + residual
   Real* velocity;           ///< that moved the vertices
-  Real* solution;           ///< of the last solve, before damping: the next start guess
   Real* normal;
   const Real* predicted;
 };
@@ -124,16 +124,23 @@ class BatchKernel {
   P stretch_pass(const Real* offset, const LawType& law);
   void edge_pass(const Real* offset);
   void helfrich_pass(const Real* offset);
-  /// F_int - m/h^2 (d - h v_pred) into scratch.force. \returns sum of squares of the inertial part, for
-  /// scale.
-  P unbalance(const BatchFields<Real>& b);
+  /// The rigid motion that carries the momenta of v_pred, which no internal force or damping can change.
+  struct Frame {
+    mesh::Body<P> body;
+    mesh::RigidMotion<P> motion;
+    V at(const V& r) const { return motion.velocity + cross(motion.spin, r - body.centre()); }
+  };
+  Frame find_frame(const BatchFields<Real>& b);
+  /// F_int - m/(h^2 (1 - kappa)) (d - h v') into scratch.force, v' = v_pred damped towards the rigid motion.
+  /// \returns sum of squares of the inertial part, for scale.
+  P unbalance(const BatchFields<Real>& b, const Frame& frame, bool damping);
   void add_rayleigh();
   void solve(Real* x);
   /// The same for N + (k_v/sum |g|^2) g g^T (Woodbury), where the volume term is too stiff for N alone.
   void solve_with_volume();
   /// d += correction; \returns |correction|^2/|d|^2.
   P correct(const BatchFields<Real>& b);
-  void damp_and_project(const BatchFields<Real>& b, bool damping);
+  void project(const BatchFields<Real>& b, const Frame& frame);
   P move(const BatchFields<Real>& b);
 
   const Tables<Real>& t_;

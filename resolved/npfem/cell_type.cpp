@@ -193,8 +193,8 @@ CellType::CellType(mesh::TriangleMesh rest, Material material, std::vector<doubl
   std::vector<Entry> matrix = laplacian_;
   for (auto& e : matrix) e.value *= stiffness_scale;
   for (int k = 0; k < n; ++k) {
-    matrix.push_back({k, k, metric_[k] / (h_ * h_)});
     kappa_.push_back(kappa_of(material_.drag_per_area, vertex_areas_[k], h_, metric_[k]));
+    matrix.push_back({k, k, metric_[k] / (h_ * h_ * (1 - kappa_[k]))});  // m/h^2 + c/h
   }
   factor_ = factorise(n, matrix);
 }

@@ -22,7 +22,7 @@ struct SparseFactor {
 };
 
 /// Rest shape, material, mass metric and time step of one kind of cell, and the matrix they make:
-/// N = diag(metric)/h^2 + Lap, Lap >= the elastic Hessian (method 3).
+/// N = diag(metric/h^2 + c/h) + Lap, c the drag of the kappa damping, Lap >= the elastic Hessian (method 3).
 class CellType {
  public:
   /// \p rest valid and centred where the body's frame is; \p metric m_k + k a_k per vertex (the mass of the

@@ -29,12 +29,12 @@ struct Membranes<Real>::Impl {
   int capacity = 0;  ///< batches
   std::vector<std::int64_t> ids;
   Array<double> anchor;
-  Array<Real> offset, residual, velocity, solution, normal, predicted;
+  Array<Real> offset, residual, velocity, normal, predicted;
   std::vector<Scratch<Real>> scratch;  ///< one per thread
   std::vector<typename BatchKernel<Real>::Report> reports;
 
   /// The fields that make up a cell's state besides id and anchor.
-  std::array<Array<Real>*, 5> state() { return {&offset, &residual, &velocity, &solution, &normal}; }
+  std::array<Array<Real>*, 4> state() { return {&offset, &residual, &velocity, &normal}; }
   std::size_t batch_size() const { return Scratch<Real>::size(vertices) * 3; }
   mesh::Layout<Real> layout() const { return {vertices}; }
 
@@ -66,8 +66,7 @@ struct Membranes<Real>::Impl {
   void clear(int c) {
     set_positions(c, type->rest().vertices);
     for (int k = 0; k < vertices; ++k)
-      for (int d = 0; d < 3; ++d)
-        velocity[layout().at(c, k, d)] = solution[layout().at(c, k, d)] = predicted[layout().at(c, k, d)] = 0;
+      for (int d = 0; d < 3; ++d) velocity[layout().at(c, k, d)] = predicted[layout().at(c, k, d)] = 0;
   }
 
   void set_positions(int c, const std::vector<Vec3>& x) {
@@ -92,7 +91,6 @@ struct Membranes<Real>::Impl {
             offset.data() + at,
             residual.data() + at,
             velocity.data() + at,
-            solution.data() + at,
             normal.data() + at,
             predicted.data() + at};
   }
@@ -187,8 +185,8 @@ void Membranes<Real>::remove(int c) {
   const auto at = layout();
   if (c != last) {
     for (int d = 0; d < 3; ++d) impl_->anchor[at.anchor(c, d)] = impl_->anchor[at.anchor(last, d)];
-    for (auto* field : {&impl_->offset, &impl_->residual, &impl_->velocity, &impl_->solution, &impl_->normal,
-                        &impl_->predicted})
+    for (auto* field :
+         {&impl_->offset, &impl_->residual, &impl_->velocity, &impl_->normal, &impl_->predicted})
       for (int k = 0; k < vertices(); ++k)
         for (int d = 0; d < 3; ++d) (*field)[at.at(c, k, d)] = (*field)[at.at(last, k, d)];
     impl_->ids[c] = impl_->ids[last];
@@ -315,8 +313,7 @@ template <class Real>
 void Membranes<Real>::set_velocities(int c, const std::vector<Vec3>& v) {
   for (int k = 0; k < vertices(); ++k)
     for (int d = 0; d < 3; ++d) {
-      const auto at = layout().at(c, k, d);
-      impl_->velocity[at] = impl_->solution[at] = static_cast<Real>(v[k][d]);
+      impl_->velocity[layout().at(c, k, d)] = static_cast<Real>(v[k][d]);
     }
 }
 

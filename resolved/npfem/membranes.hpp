@@ -55,9 +55,13 @@ class Membranes {
   /// v_pred = (m v^n + k a w + h F)/(m + k a), to be written by the caller before each step.
   View<Real> predicted();
 
-  /// Moves every cell by h: solves (metric/h)(v - v_pred) = F_int(x^n + h v), damps, x += h v, new normals.
-  /// sum metric (v - v_pred) = 0 and sum r^n x metric (v - v_pred) = 0 hold for every cell to round-off,
-  /// whatever the iterations. Threads over batches; bit-identical for any number of threads and neighbours.
+  /// Moves every cell by h: solves (metric/h)(v - v_pred) = F_int(x^n + h v) - c (v - V - omega x r), x += h
+  /// v, new normals. V, omega is the rigid motion with the momenta of v_pred; c = metric kappa/((1 - kappa)
+  /// h) is the drag of the kappa damping (method 3). The paper damps after the solve, v <- v + kappa (V +
+  /// omega x r - v), and moves by the damped v: the same drag, but with the forces taken 1/(1 - kappa) steps
+  /// ahead; here they are taken where the step ends, so relaxation times do not depend on h. sum metric (v -
+  /// v_pred) = 0 and sum r^n x metric (v - v_pred) = 0 hold for every cell to round-off, whatever the
+  /// iterations. Threads over batches; bit-identical for any number of threads and neighbours.
   StepReport step(const StepOptions& options = {});
 
   mesh::Vec3 anchor(int c) const;

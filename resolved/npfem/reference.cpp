@@ -162,7 +162,7 @@ class Potential {
     double sum = energy(type_, x).total();
     for (std::size_t k = 0; k < d.size(); ++k) {
       const auto gap = mesh::subtract(d[k], mesh::scale(h, v_pred_[k]));
-      sum += type_.metric()[k] / (2 * h * h) * mesh::dot(gap, gap);
+      sum += rate(k) / 2 * mesh::dot(gap, gap);
     }
     if (type_.material().rayleigh_beta > 0)
       sum += type_.material().rayleigh_beta / (2 * h) * inner(d, lap(d));
@@ -176,7 +176,7 @@ class Potential {
     Field r = forces(type_, x);
     scale = 0;
     for (std::size_t k = 0; k < d.size(); ++k) {
-      const double m = type_.metric()[k] / (h * h);
+      const double m = rate(k);
       const auto inertia = mesh::scale(m, mesh::subtract(mesh::scale(h, v_pred_[k]), d[k]));
       mesh::accumulate(r[k], 1, inertia);
       scale += m * m * h * h * mesh::dot(v_pred_[k], v_pred_[k]) + mesh::dot(inertia, inertia);
@@ -187,6 +187,9 @@ class Potential {
   }
 
  private:
+  double rate(std::size_t k) const {
+    return type_.metric()[k] / (type_.h() * type_.h() * (1 - type_.kappa()[k]));
+  }
   Field lap(const Field& d) const {
     Field y(d.size(), Vec3{});
     for (const auto& e : type_.laplacian()) {
@@ -199,6 +202,30 @@ class Potential {
   const State& s_;
   const Field& v_pred_;
 };
+
+/// The rigid part of a velocity field: the rigid motion with its momenta in the metric, at positions x.
+Field rigid_part(const CellType& type, const Field& x, const Field& v) {
+  const auto& m = type.metric();
+  Vec3 origin{};  // near the body, for round-off
+  for (const auto& p : x) mesh::accumulate(origin, 1.0 / static_cast<double>(x.size()), p);
+  const auto arm = [&](std::size_t k) { return vec(mesh::subtract(x[k], origin)); };
+  double mass = 0;
+  mesh::Inertia<double> inertia;
+  mesh::Momentum<double> momentum;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    mass += m[k];
+    inertia.add(m[k], arm(k));
+    momentum.add(m[k], arm(k), vec(v[k]));
+  }
+  const mesh::Body<double> body(mass, inertia);
+  const auto motion = body.motion(momentum);
+  Field result(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const V u = motion.velocity + cross(motion.spin, arm(k) - body.centre());
+    result[k] = {u.x, u.y, u.z};
+  }
+  return result;
+}
 
 /// Limited-memory BFGS with H0 = N^{-1}.
 class Lbfgs {
@@ -305,7 +332,11 @@ Field apply_inverse(const CellType& type, Field b) {
 
 SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, double tolerance,
                           int max_iterations, bool project) {
-  const Potential potential(type, s, v_pred);
+  const Field rigid = rigid_part(type, s.x, v_pred);
+  Field damped = v_pred;
+  for (std::size_t k = 0; k < damped.size(); ++k)
+    mesh::accumulate(damped[k], type.kappa()[k], mesh::subtract(rigid[k], v_pred[k]));
+  const Potential potential(type, s, damped);
   Lbfgs lbfgs(type);
   const double h = type.h();
   Field d(s.x.size());
@@ -339,38 +370,12 @@ SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, d
     d = trial, value = trial_value;
   }
   for (std::size_t k = 0; k < d.size(); ++k) s.v[k] = mesh::scale(1 / h, d[k]);
-  if (project) damp_and_project(type, s.x, v_pred, s.v);
+  if (project) {
+    axpy(-1, rigid_part(type, s.x, s.v), s.v);
+    axpy(1, rigid, s.v);
+  }
   axpy(h, s.v, s.x);
   return report;
-}
-
-void damp_and_project(const CellType& type, const Field& x, const Field& v_pred, Field& v) {
-  const auto& m = type.metric();
-  Vec3 origin{};  // near the body, for round-off
-  for (const auto& p : x) mesh::accumulate(origin, 1.0 / static_cast<double>(x.size()), p);
-  const auto arm = [&](std::size_t k) { return vec(mesh::subtract(x[k], origin)); };
-  double mass = 0;
-  mesh::Inertia<double> inertia;
-  mesh::Momentum<double> wanted, solved;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    mass += m[k];
-    inertia.add(m[k], arm(k));
-    wanted.add(m[k], arm(k), vec(v_pred[k]));
-    solved.add(m[k], arm(k), vec(v[k]));
-  }
-  const mesh::Body<double> body(mass, inertia);
-  const auto motion = [&](const mesh::RigidMotion<double>& r, std::size_t k) {
-    return r.velocity + cross(r.spin, arm(k) - body.centre());
-  };
-  const auto before = body.motion(solved);
-  mesh::Momentum<double> left;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    const V u = (1 - type.kappa()[k]) * (vec(v[k]) - motion(before, k));
-    v[k] = {u.x, u.y, u.z};
-    left.add(m[k], arm(k), u);
-  }
-  const auto after = body.motion({wanted.linear - left.linear, wanted.angular - left.angular});
-  for (std::size_t k = 0; k < x.size(); ++k) push(v, static_cast<int>(k), motion(after, k));
 }
 
 void step_rk4(const CellType& type, State& s, double t, double dt, const ExternalForce& external) {

@@ -48,8 +48,4 @@ using ExternalForce = std::function<void(double t, const std::vector<mesh::Vec3>
 /// Classical Runge-Kutta of metric dv/dt = F_int(x) + F_ext: the explicit high-accuracy reference.
 void step_rk4(const CellType& type, State& s, double t, double dt, const ExternalForce& external);
 
-/// Kappa damping and the projection to the momenta of v_pred, as in the fast path, at positions x.
-void damp_and_project(const CellType& type, const std::vector<mesh::Vec3>& x,
-                      const std::vector<mesh::Vec3>& v_pred, std::vector<mesh::Vec3>& v);
-
 }  // namespace hemowalk::npfem
