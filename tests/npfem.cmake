@@ -6,3 +6,5 @@ hemowalk_test(test_mesh
   SOURCES unit/test_mesh_shapes.cpp unit/test_mesh_file.cpp unit/test_mesh_observables.cpp
   LINK hemowalk_mesh LABELS unit)
 hemowalk_test(test_npfem_terms SOURCES unit/test_npfem_terms.cpp LINK hemowalk_npfem LABELS unit)
+hemowalk_test(test_npfem_batch SOURCES unit/test_npfem_batch.cpp LINK hemowalk_npfem LABELS unit)
+hemowalk_test(test_rigid SOURCES unit/test_rigid_bodies.cpp LINK hemowalk_rigid LABELS unit)
