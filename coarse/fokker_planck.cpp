@@ -38,6 +38,15 @@ FokkerPlanck::FokkerPlanck(const SlabLaw& law, const Face& bottom, const Face& t
   lower_.assign(n, 0);
   middle_.assign(n, 0);
   upper_.assign(n, 0);
+  add_interior(law);
+  add_face(law, bottom, 0, cell_free_layer);
+  add_face(law, top, 1, cell_free_layer);
+  for (auto* v : {&factor_lower_, &factor_middle_, &factor_upper_, &correction_, &stage_one_, &stage_two_})
+    v->assign(n, 0);
+}
+
+void FokkerPlanck::add_interior(const SlabLaw& law) {
+  const int cells = this->cells();
   // between cells i and i + 1 of the unknowns (cell 0 is unknown 1)
   for (int i = 1; i < cells; ++i) {
     const double y = i * cell_;
@@ -54,36 +63,34 @@ FokkerPlanck::FokkerPlanck(const SlabLaw& law, const Face& bottom, const Face& t
     middle_[1] -= e.from_b / cell_;
     corner_bottom_ = e.from_b / cell_;
   }
-  for (int side = 0; side < 2; ++side) {
-    const Face& face = side == 0 ? bottom : top;
-    if (face.type == Face::Type::reflect || face.type == Face::Type::periodic) continue;
-    // Half a cell lies between the first cell's centre and the face; drift towards the face counts as inward.
-    const double y = side == 0 ? 0 : height_;
-    const double towards = side == 0 ? -law.v_at(y) : law.v_at(y);
-    const Exchange half = exchange(law.D_at(y), towards, cell_ / 2);
-    // Uptake velocity k and release rate r of the face; the concentration at the face is in balance at once:
-    // half.from_a c - half.from_b c_face = k c_face - r amount.
-    double k = HUGE_VAL, release = 0;
-    if (face.type == Face::Type::robin) k = face.rate;
-    if (face.type == Face::Type::trap) {
-      const double layer = face.layer > 0 ? face.layer : cell_free_layer;
-      require(std::isfinite(layer) && layer > 0 && face.rate > 0,
-              "a trap needs a residence time and the thickness of its layer (neither the face nor the law's "
-              "cell_free_layer states one) use a law with a cell-free layer");
-      k = layer / face.rate;
-      release = 1 / face.rate;
-    }
-    const double taken_share = std::isinf(k) ? 1 : k / (half.from_b + k);
-    const double rate_in = half.from_a * taken_share / cell_;
-    const double rate_out = release * (1 - taken_share);
-    const std::size_t amount = side == 0 ? 0 : n - 1, first = side == 0 ? 1 : n - 2;
-    middle_[first] -= rate_in;
-    middle_[amount] -= rate_out;
-    (side == 0 ? upper_ : lower_)[amount] += rate_in;
-    (side == 0 ? lower_ : upper_)[first] += rate_out;
+}
+
+void FokkerPlanck::add_face(const SlabLaw& law, const Face& face, int side, double cell_free_layer) {
+  if (face.type == Face::Type::reflect || face.type == Face::Type::periodic) return;
+  // Half a cell lies between the first cell's centre and the face; drift towards the face counts as inward.
+  const double y = side == 0 ? 0 : height_;
+  const double towards = side == 0 ? -law.v_at(y) : law.v_at(y);
+  const Exchange half = exchange(law.D_at(y), towards, cell_ / 2);
+  // Uptake velocity k and release rate r of the face; the concentration at the face is in balance at once:
+  // half.from_a c - half.from_b c_face = k c_face - r amount.
+  double k = HUGE_VAL, release = 0;
+  if (face.type == Face::Type::robin) k = face.rate;
+  if (face.type == Face::Type::trap) {
+    const double layer = face.layer > 0 ? face.layer : cell_free_layer;
+    require(std::isfinite(layer) && layer > 0 && face.rate > 0,
+            "a trap needs a residence time and the thickness of its layer (neither the face nor the law's "
+            "cell_free_layer states one) use a law with a cell-free layer");
+    k = layer / face.rate;
+    release = 1 / face.rate;
   }
-  for (auto* v : {&factor_lower_, &factor_middle_, &factor_upper_, &correction_, &stage_one_, &stage_two_})
-    v->assign(n, 0);
+  const double taken_share = std::isinf(k) ? 1 : k / (half.from_b + k);
+  const double rate_in = half.from_a * taken_share / cell_;
+  const double rate_out = release * (1 - taken_share);
+  const std::size_t n = unknown_.size(), amount = side == 0 ? 0 : n - 1, first = side == 0 ? 1 : n - 2;
+  middle_[first] -= rate_in;
+  middle_[amount] -= rate_out;
+  (side == 0 ? upper_ : lower_)[amount] += rate_in;
+  (side == 0 ? lower_ : upper_)[first] += rate_out;
 }
 
 void FokkerPlanck::rate(const std::vector<double>& u, std::vector<double>& result) const {

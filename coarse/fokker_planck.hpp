@@ -33,6 +33,8 @@ class FokkerPlanck {
   int cells() const { return static_cast<int>(unknown_.size()) - 2; }
 
  private:
+  void add_interior(const SlabLaw& law);
+  void add_face(const SlabLaw& law, const Face& face, int side, double cell_free_layer);
   double taken(bool by_traps) const;
   void factorise(double step);
   void solve(std::vector<double>& right) const;

@@ -54,7 +54,11 @@ class Curve {
 /// Where the walls of the measured gap lie in the coordinates of the profile, and how thick its layers are.
 struct MeasuredGap {
   double low, high, layer;
+  double height() const { return high - low; }
 };
+
+/// D below this share of the core value is raised to it.
+constexpr double smallest_share_of_core = 0.01;
 
 bool known(double x) { return std::isfinite(x) && x > 0; }
 
@@ -78,13 +82,46 @@ void check_profile(const std::vector<double>& y, const std::vector<double>& D, c
   for (std::size_t i = 0; i < y.size(); ++i) {
     require(std::isfinite(y[i]) && std::isfinite(D[i]) && std::isfinite(v[i]) && D[i] > 0, [&] {
       return fmt::format(
-          "the law's profile is not usable at node {} (D = {:g} m2/s, v = {:g} m/s; D must be "
-          "positive, all finite) drop the node or calibrate with wider bins",
+          "the law's profile is not usable at node {} (D = {:g} m2/s, v = {:g} m/s are not finite) "
+          "drop the node or calibrate with wider bins",
           i, D[i], v[i]);
     });
     require(i == 0 || y[i] > y[i - 1], "the law's profile is not sorted (y_m must increase) sort it");
   }
 }
+
+/// D and v over the measured gap, of the law itself (draw -1) or of one of its draws.
+struct GapProfile {
+  Curve D, v;
+  MeasuredGap gap;
+
+  GapProfile(const data::TransportLaw& law, int draw)
+      : D(law.profile.y, usable_D(law, draw)), v(law.profile.y, drift(law, draw)), gap(measured_gap(law)) {}
+
+  /// 1 in the wall layer, 0 in the core, a cosine over half a layer thickness in between.
+  double layer_weight(double d) const {
+    const double join = std::min(1.5 * gap.layer, gap.height() / 2);
+    if (d >= join) return 0;
+    if (d <= gap.layer) return 1;
+    return (1 + std::cos(std::numbers::pi * (d - gap.layer) / (join - gap.layer))) / 2;
+  }
+  /// At distance d from a wall: mean of both walls; v counts away from the wall.
+  double layer_D(double d) const { return (D(gap.low + d) + D(gap.high - d)) / 2; }
+  double layer_v(double d) const { return (v(gap.low + d) - v(gap.high - d)) / 2; }
+
+ private:
+  /// An estimate may reach zero or below, a walker cannot.
+  static std::vector<double> usable_D(const data::TransportLaw& law, int draw) {
+    auto D = draw < 0 ? law.profile.D : law.profile.D_draws.at(draw);
+    for (double& x : D) x = std::isnan(x) ? x : std::max(x, law.core.D * smallest_share_of_core);
+    check_profile(law.profile.y, D, drift(law, draw));
+    return D;
+  }
+  static const std::vector<double>& drift(const data::TransportLaw& law, int draw) {
+    const bool drawn = draw >= 0 && static_cast<std::size_t>(draw) < law.profile.v_draws.size();
+    return drawn ? law.profile.v_draws[draw] : law.profile.v;
+  }
+};
 
 double mean_over(const Curve& f, double a, double b) {
   double sum = 0;
@@ -106,8 +143,6 @@ double shear_factor(const data::TransportLaw& law, const Case& the_case, double 
   return std::pow(std::abs(the_case.shear_rate) / law.conditions.shear_rate, exponent);
 }
 
-SlabLaw homogeneous(double height, double D) { return {height, {D, D}, {0, 0}}; }
-
 }  // namespace
 
 double SlabLaw::D_at(double y) const { return between_nodes(D, y / spacing()); }
@@ -120,41 +155,30 @@ SlabLaw map_law(const data::TransportLaw& law, const Case& the_case, const LawDr
   const double sigma = known(law.core.D_sigma) ? law.core.D_sigma : 0;
   const double core = std::max(law.core.D + draw.core_score * sigma, law.core.D / 20);
   const double height = the_case.height;
-  const auto& y = law.profile.y;
-  if (y.empty() || the_case.constant_D || the_case.bottom.type == Face::Type::periodic)
-    return homogeneous(height, factor * core);
+  if (law.profile.y.empty() || the_case.constant_D || the_case.bottom.type == Face::Type::periodic)
+    return {height, {factor * core, factor * core}, {0, 0}};
 
-  auto D_nodes = draw.draw < 0 ? law.profile.D : law.profile.D_draws.at(draw.draw);
-  if (draw.draw >= 0)  // a posterior may reach below zero, a walker cannot
-    for (double& D : D_nodes) D = std::max(D, law.core.D / 100);
-  const bool v_drawn = draw.draw >= 0 && static_cast<std::size_t>(draw.draw) < law.profile.v_draws.size();
-  const auto& v_nodes = v_drawn ? law.profile.v_draws[draw.draw] : law.profile.v;
-  check_profile(y, D_nodes, v_nodes);
-  const Curve D(y, D_nodes), v(y, v_nodes);
-  const MeasuredGap gap = measured_gap(law);
+  const GapProfile profile(law, draw.draw);
   // A draw brings its own level; without draws the profile moves with the core value.
   const double level = draw.draw < 0 ? core / law.core.D : 1;
-
-  const double gap_height = gap.high - gap.low, spacing = gap_height / static_cast<double>(y.size());
-  const bool whole = std::abs(height - gap_height) <= 0.01 * gap_height;
-  const double join = std::min(gap.layer * 1.5, gap_height / 2);
-  const auto D_mapped = [&](double at) {
-    if (whole) return factor * level * D(gap.low + at * gap_height / height);
-    const double d = std::min(at, height - at);
-    if (d >= join) return factor * core;
-    const double layer = level * (D(gap.low + d) + D(gap.high - d)) / 2;
-    const double s = d <= gap.layer ? 0 : (d - gap.layer) / (join - gap.layer);
-    return factor * (core + (layer - core) * (1 + std::cos(std::numbers::pi * s)) / 2);
-  };
-  const auto v_mapped = [&](double at) {
-    if (whole) return factor * v(gap.low + at * gap_height / height);
-    const double d = std::min(at, height - at);
-    if (d >= join) return 0.0;
-    const double away_from_wall = (v(gap.low + d) - v(gap.high - d)) / 2;
-    const double s = d <= gap.layer ? 0 : (d - gap.layer) / (join - gap.layer);
-    return (at <= height / 2 ? factor : -factor) * away_from_wall * (1 + std::cos(std::numbers::pi * s)) / 2;
-  };
-  return make_slab_law(height, cells_for(height, spacing), D_mapped, v_mapped);
+  const MeasuredGap& gap = profile.gap;
+  const int cells = cells_for(height, gap.height() / static_cast<double>(law.profile.y.size()));
+  if (std::abs(height - gap.height()) <= 0.01 * gap.height()) {
+    const auto in_gap = [&](double y) { return gap.low + y * gap.height() / height; };
+    return make_slab_law(
+        height, cells, [&](double y) { return factor * level * profile.D(in_gap(y)); },
+        [&](double y) { return factor * profile.v(in_gap(y)); });
+  }
+  return make_slab_law(
+      height, cells,
+      [&](double y) {
+        const double d = std::min(y, height - y), w = profile.layer_weight(d);
+        return factor * (w > 0 ? core + w * (level * profile.layer_D(d) - core) : core);
+      },
+      [&](double y) {
+        const double d = std::min(y, height - y), w = profile.layer_weight(d);
+        return w > 0 ? (y <= height / 2 ? factor : -factor) * w * profile.layer_v(d) : 0;
+      });
 }
 
 std::vector<LawDraw> law_ensemble(const data::TransportLaw& law, int count) {
@@ -217,6 +241,13 @@ std::vector<std::string> validity_findings(const data::TransportLaw& law, const 
                        (names.empty() ? std::string("no finding named") : names) +
                        ") do not trust its D before the findings are explained");
   }
+  const auto low = std::count_if(law.profile.D.begin(), law.profile.D.end(),
+                                 [&](double D) { return D < law.core.D * smallest_share_of_core; });
+  if (low > 0)
+    findings.push_back(
+        fmt::format("D is below {:g} of the core value at {} of {} nodes of the law's profile (too few "
+                    "platelets there?) that share of the core value is used; calibrate with wider bins",
+                    smallest_share_of_core, low, law.profile.D.size()));
   if (!law.profile.y.empty() && the_case.bottom.type != Face::Type::periodic) {
     const MeasuredGap gap = measured_gap(law);
     if (the_case.height < 0.99 * (gap.high - gap.low))

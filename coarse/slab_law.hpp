@@ -40,7 +40,8 @@ struct LawDraw {
 ///   joined by a cosine over half a layer thickness. A layer ends where core.y_range begins.
 /// D and v are scaled by (shear / measured shear)^exponent unless the case gives a constant D or has no flow.
 /// Nodes: a power of two of cells, at least 16 per node of the profile, at most 4096.
-/// \throws InputError for a profile that is unsorted, not finite, or not positive.
+/// D below 1 % of the core value is raised to that (a finding tells). \throws InputError for a profile that
+/// is unsorted or not finite.
 SlabLaw map_law(const data::TransportLaw& law, const Case& the_case, const LawDraw& draw = {});
 
 /// \p count members that represent the law's uncertainty, evenly spread over its quantiles (no random
