@@ -3,6 +3,7 @@
 #include <string>
 
 #include "core/check.hpp"
+#include "core/simd.hpp"
 #include "resolved/contact/geometry.hpp"
 #include "resolved/contact/law.hpp"
 #include "resolved/contact/neighbours.hpp"
@@ -127,26 +128,46 @@ void Contact<Real>::State::press_walls(std::size_t b) {
 
 /// The nearest candidate, if any can press. Candidates come in order of their distance at the search; once
 /// that, less what the bodies may have approached since, exceeds the best so far, none of the rest can win.
+/// Of equals the lowest number wins: the outcome does not depend on when the list was made, so a restart is
+/// exact.
 template <class Real>
 bool Contact<Real>::State::nearest(const Neighbourhood<Real>& near, const Entry& entry, const Link& link,
                                    const Point<Real>& p, Real approached, Nearest<Real>& best,
                                    std::uint32_t& triangle) const {
+  constexpr std::size_t width = 8;
+  using P = Pack<Real, width>;
   const Topology& shape = shapes[cloud.bodies[link.target].shape];
   const Point<Real>* x = cloud.x.data() + cloud.first[link.target];
+  const Point<P> point{P(p.x), P(p.y), P(p.z)};
   Real limit = Real(std::max(law.range, law.depth));
   best.squared = limit * limit;
-  bool found = false;
+  triangle = ~0u;
   const Candidate* c = near.candidates.data() + entry.candidates;
-  for (const Candidate* end = c + entry.count; c != end && c->distance - approached <= limit; ++c) {
-    const Corners& corners = shape.triangles[c->triangle];
-    const Nearest<Real> n = nearest_on_triangle(p, x[corners[0]], x[corners[1]], x[corners[2]]);
-    if (n.squared >= best.squared) continue;
-    best = n;
-    triangle = c->triangle;
-    limit = std::sqrt(n.squared);
-    found = true;
+  for (const Candidate* end = c + entry.count; c < end && c->distance - approached <= limit; c += width) {
+    alignas(64) Real corner[9][width];
+    const std::size_t count = std::min<std::size_t>(width, static_cast<std::size_t>(end - c));
+    for (std::size_t l = 0; l < width; ++l) {
+      const Corners& corners = shape.triangles[c[std::min(l, count - 1)].triangle];
+      for (int k = 0; k < 3; ++k) {
+        const Point<Real>& v = x[corners[k]];
+        corner[3 * k][l] = v.x, corner[3 * k + 1][l] = v.y, corner[3 * k + 2][l] = v.z;
+      }
+    }
+    Point<P> v[3];
+    for (int k = 0; k < 3; ++k)
+      v[k] = {hemowalk::load<Real, width>(corner[3 * k]), hemowalk::load<Real, width>(corner[3 * k + 1]),
+              hemowalk::load<Real, width>(corner[3 * k + 2])};
+    const Nearest<P> n = nearest_on_triangle(point, v[0], v[1], v[2]);
+    if (stdx::hmin(n.squared) > best.squared) continue;
+    for (std::size_t l = 0; l < count; ++l) {
+      const Real squared = n.squared[l];
+      if (squared > best.squared || (squared == best.squared && c[l].triangle > triangle)) continue;
+      best = {n.wb[l], n.wc[l], {n.to_point.x[l], n.to_point.y[l], n.to_point.z[l]}, squared};
+      triangle = c[l].triangle;
+    }
+    limit = std::sqrt(best.squared);
   }
-  return found;
+  return triangle != ~0u;
 }
 
 /// Forces on the body's vertices from the surfaces they are near to; the reactions are remembered.
@@ -163,12 +184,16 @@ void Contact<Real>::State::press_bodies(std::size_t b) {
   near.presses.clear();
   for (Link& link : near.links) {
     link.presses_begin = static_cast<std::uint32_t>(near.presses.size());
-    const Real approached = Real(approach(motions[b], motions[link.target]) + 1e-5);
+    const Real pair_approached = Real(approach(motions[b], motions[link.target]) + 1e-5);
+    const Motion& away = motions[link.target];
     const Point<Real> shift = neighbours.shift(cloud, static_cast<std::uint32_t>(b), link.target, link.wraps);
     const Topology& shape = shapes[cloud.bodies[link.target].shape];
     const Point<Real>* target = cloud.x.data() + cloud.first[link.target];
     for (std::uint32_t e = link.entries_begin; e < link.entries_end; ++e) {
       const Entry& entry = near.entries[e];
+      if (entry.gap - pair_approached >= Real(law.range)) continue;
+      const Real approached =
+          std::min(pair_approached, Real(neighbours.moved(cloud, b, entry.vertex, away) + 1e-5));
       if (entry.gap - approached >= Real(law.range)) continue;
       Nearest<Real> q;
       std::uint32_t t = 0;
@@ -293,6 +318,16 @@ Summary Contact<Real>::compute(View<const Origin> origin, View<const Node4<Real>
   }
   for (const Share& share : s.share) add(sum, share);
   return sum;
+}
+
+template <class Real>
+std::vector<std::byte> Contact<Real>::save() const {
+  return state_->neighbours.save();
+}
+
+template <class Real>
+void Contact<Real>::load(View<const std::byte> state) {
+  state_->neighbours.load(state, state_->cloud);
 }
 
 template <class Real>

@@ -12,6 +12,7 @@
 /// the energy, has no tangential part, and closes linear and angular momentum pair by pair to round-off.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -96,6 +97,12 @@ class Contact {
   /// nothing once the neighbour lists have reached their size. \throws PhysicsError for a position that is
   /// not finite.
   Summary compute(View<const Origin> origin, View<const Node4<Real>> local, View<Node4<Real>> force);
+
+  /// State that the next forces depend on in their last bit (positions of the last search), for exact
+  /// restarts.
+  std::vector<std::byte> save() const;
+  /// Call after set_bodies(). \throws InputError if \p state belongs to other bodies.
+  void load(View<const std::byte> state);
 
   /// Neighbour searches so far; for benchmarks and tests.
   std::int64_t searches() const;

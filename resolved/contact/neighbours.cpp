@@ -1,5 +1,7 @@
 #include "resolved/contact/neighbours.hpp"
 
+#include "core/check.hpp"
+
 #include <omp.h>
 
 #include "core/simd.hpp"
@@ -262,9 +264,10 @@ bool Neighbours<Real>::select(const Cloud<Real>& cloud, std::uint32_t body, std:
   };
   for (std::uint32_t t = 0; t < count; t += width) {
     const std::size_t g = begin + t;
-    const Floats dx = beyond(load<float, 16>(&gx_[g]), lo[0], hi[0]),
-                 dy = beyond(load<float, 16>(&gy_[g]), lo[1], hi[1]),
-                 dz = beyond(load<float, 16>(&gz_[g]), lo[2], hi[2]), r = load<float, 16>(&gr_[g]);
+    const Floats dx = beyond(hemowalk::load<float, 16>(&gx_[g]), lo[0], hi[0]),
+                 dy = beyond(hemowalk::load<float, 16>(&gy_[g]), lo[1], hi[1]),
+                 dz = beyond(hemowalk::load<float, 16>(&gz_[g]), lo[2], hi[2]),
+                 r = hemowalk::load<float, 16>(&gr_[g]);
     auto close = dx * dx + dy * dy + dz * dz <= r * r;
     while (stdx::any_of(close)) {
       const auto lane = static_cast<std::uint32_t>(stdx::find_first_set(close));
@@ -289,8 +292,8 @@ void Neighbours<Real>::find_hits(const Cloud<Real>& cloud, std::uint32_t target,
               pz = scratch.vertices.z[vertex];
   const Stretch& s = scratch.triangles;
   for (std::size_t i = 0; i < s.count; i += width) {
-    const Floats dx = load<float, 16>(&s.x[i]) - px, dy = load<float, 16>(&s.y[i]) - py,
-                 dz = load<float, 16>(&s.z[i]) - pz, r = load<float, 16>(&s.r[i]);
+    const Floats dx = hemowalk::load<float, 16>(&s.x[i]) - px, dy = hemowalk::load<float, 16>(&s.y[i]) - py,
+                 dz = hemowalk::load<float, 16>(&s.z[i]) - pz, r = hemowalk::load<float, 16>(&s.r[i]);
     auto close = dx * dx + dy * dy + dz * dz <= r * r;
     while (stdx::any_of(close)) {
       const auto lane = static_cast<std::size_t>(stdx::find_first_set(close));
@@ -320,8 +323,9 @@ void Neighbours<Real>::measure_hits(Scratch& scratch) const {
   for (std::size_t i = 0; i < count; i += 16) {
     Point<P> x[3];
     for (int k = 0; k < 3; ++k)
-      x[k] = {load<float, 16>(&scratch.corner[3 * k][i]), load<float, 16>(&scratch.corner[3 * k + 1][i]),
-              load<float, 16>(&scratch.corner[3 * k + 2][i])};
+      x[k] = {hemowalk::load<float, 16>(&scratch.corner[3 * k][i]),
+              hemowalk::load<float, 16>(&scratch.corner[3 * k + 1][i]),
+              hemowalk::load<float, 16>(&scratch.corner[3 * k + 2][i])};
     alignas(64) float distance[16];
     const P zero(0);
     store<float, 16>(stdx::sqrt(nearest_on_triangle(Point<P>{zero, zero, zero}, x[0], x[1], x[2]).squared),
@@ -373,6 +377,32 @@ void Neighbours<Real>::collect_incoming(std::size_t bodies) {
       incoming_[incoming_begin_[near_[b].links[l].target]++] = {b, l};
   for (std::size_t b = bodies; b > 0; --b) incoming_begin_[b] = incoming_begin_[b - 1];
   incoming_begin_[0] = 0;
+}
+
+template <class Real>
+std::vector<std::byte> Neighbours<Real>::save() const {
+  std::vector<std::byte> out;
+  if (!valid_) return out;
+  const std::size_t origins = reference_origin_.size() * sizeof(Origin),
+                    points = reference_.size() * sizeof(Point<Real>);
+  out.resize(origins + points);
+  std::memcpy(out.data(), reference_origin_.data(), origins);
+  std::memcpy(out.data() + origins, reference_.data(), points);
+  return out;
+}
+
+template <class Real>
+void Neighbours<Real>::load(View<const std::byte> state, Cloud<Real>& cloud) {
+  valid_ = false;
+  if (state.size == 0) return;
+  const std::size_t origins = cloud.origin.size() * sizeof(Origin),
+                    points = cloud.x.size() * sizeof(Point<Real>);
+  require(state.size == origins + points,
+          "the saved contact state does not fit (other bodies) use the scene it was made with");
+  std::memcpy(static_cast<void*>(cloud.origin.data()), state.data, origins);
+  std::memcpy(static_cast<void*>(cloud.x.data()), state.data + origins, points);
+  search(cloud);
+  valid_ = true;
 }
 
 template class Neighbours<float>;

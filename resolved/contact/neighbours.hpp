@@ -3,6 +3,7 @@
 /// holds.
 
 #include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "resolved/contact/contact.hpp"
@@ -89,6 +90,12 @@ class Neighbours {
 
   /// Makes the lists hold for the positions in \p cloud: measures motions and searches again where needed.
   void update(const Cloud<Real>& cloud);
+  /// Positions of the last search, exactly. Sums depend on the order of candidates at that time, so a restart
+  /// goes on from the same lists. Empty before the first search.
+  std::vector<std::byte> save() const;
+  /// Searches at the saved positions. \p cloud has the bodies and lends its memory. \throws InputError if
+  /// they differ.
+  void load(View<const std::byte> state, Cloud<Real>& cloud);
   /// Forgets the lists: bodies changed.
   void reset() { valid_ = false; }
   void set_domain(const Domain& domain) { domain_ = domain, valid_ = false; }
@@ -99,7 +106,20 @@ class Neighbours {
   const std::vector<std::uint32_t>& incoming_begin() const { return incoming_begin_; }
   const std::vector<Incoming>& incoming() const { return incoming_; }
   std::int64_t searches() const { return searches_; }
-  /// Whether a body's bounding box, moved as the body did since the search, may reach beyond planes y = low, high.
+  /// Upper limit of how much a vertex's distance to points of a body that moved by \p other has changed since
+  /// the search.
+  double moved(const Cloud<Real>& cloud, std::size_t body, std::uint32_t vertex, const Motion& other) const {
+    const std::size_t i = cloud.first[body] + vertex;
+    const Point<Real> d = cloud.x[i] - reference_[i];
+    const auto& now = cloud.origin[body];
+    const auto& then = reference_origin_[body];
+    const double x = now[0] - then[0] + double(d.x) - other.mean[0],
+                 y = now[1] - then[1] + double(d.y) - other.mean[1],
+                 z = now[2] - then[2] + double(d.z) - other.mean[2];
+    return std::sqrt(x * x + y * y + z * z) + other.spread;
+  }
+  /// Whether a body's bounding box, moved as the body did since the search, may reach beyond planes y = low,
+  /// high.
   bool beyond(std::size_t b, double low, double high) const {
     const Motion& m = motions_[b];
     return boxes_[b].low[1] + m.mean[1] - m.spread < low || boxes_[b].high[1] + m.mean[1] + m.spread > high;

@@ -307,24 +307,25 @@ TEST(ContactForces, AreTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-// Bodies in shear, turning: lists that are kept for many steps give what a fresh search gives.
+// Bodies in shear, turning: lists that are kept for many steps give what a fresh search gives, to the bit,
+// because a restarted run has no old lists.
 TEST(ContactForces, OldNeighbourListsMissNothing) {
   const Vec3 box{24, 24, 26};
-  ContactBodies<double> set = crowd<double>(14, box);
+  ContactBodies<float> set = crowd<float>(14, box);
   auto kept = set.contact(law, slab(box));
   const int steps = 120;
   for (int n = 0; n < steps; ++n) {
     for (std::size_t b = 0; b < set.bodies.size(); ++b) {
-      Vec3 c{};
+      float c[3]{};
       const std::size_t count = set.vertices(static_cast<int>(b));
       for (std::size_t v = 0; v < count; ++v) {
         const auto& p = set.local[set.bodies[b].first + v];
-        c[0] += p.x / count, c[1] += p.y / count, c[2] += p.z / count;
+        c[1] += p.y / static_cast<float>(count), c[2] += p.z / static_cast<float>(count);
       }
       for (std::size_t v = 0; v < count; ++v) {
         auto& p = set.local[set.bodies[b].first + v];
-        const double y = p.y - c[1], z = p.z - c[2];
-        p.y += -0.003 * z, p.z += 0.003 * y + 0.0015 * (c[1] + set.origin[b][1] - 12);
+        const float y = p.y - c[1], z = p.z - c[2];
+        p.y += -0.003f * z, p.z += 0.003f * y + 0.0015f * (c[1] + static_cast<float>(set.origin[b][1] - 12));
       }
       if (n % 40 == 17)  // the caller may move its origins at any time
         for (std::size_t v = 0; v < count; ++v) set.local[set.bodies[b].first + v].z -= 1;
@@ -335,11 +336,10 @@ TEST(ContactForces, OldNeighbourListsMissNothing) {
     auto fresh = set.contact(law, slab(box));
     const Summary exact = set.compute(fresh);
     ASSERT_EQ(sum.contacts, exact.contacts) << "step " << n;
-    ASSERT_NEAR(sum.energy, exact.energy, 1e-12 * exact.energy);
-    double scale = 0;
-    for (const auto& f : force) scale = std::max(scale, std::abs(f.y));
+    ASSERT_EQ(sum.energy, exact.energy);
     for (std::size_t m = 0; m < force.size(); ++m)
-      ASSERT_NEAR(set.force[m].y, force[m].y, 1e-10 * scale) << n;
+      ASSERT_TRUE(set.force[m].x == force[m].x && set.force[m].y == force[m].y &&
+                  set.force[m].z == force[m].z);
   }
   EXPECT_GT(kept.searches(), 2);
   EXPECT_LT(kept.searches(), steps / 3);
