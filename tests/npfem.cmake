@@ -8,3 +8,10 @@ hemowalk_test(test_mesh
 hemowalk_test(test_npfem_terms SOURCES unit/test_npfem_terms.cpp LINK hemowalk_npfem LABELS unit)
 hemowalk_test(test_npfem_batch SOURCES unit/test_npfem_batch.cpp LINK hemowalk_npfem LABELS unit)
 hemowalk_test(test_rigid SOURCES unit/test_rigid_bodies.cpp LINK hemowalk_rigid LABELS unit)
+hemowalk_test(test_npfem_dynamics SOURCES verification/test_npfem_dynamics.cpp LINK hemowalk_npfem LABELS verification)
+
+find_package(benchmark QUIET)
+if(benchmark_FOUND)
+  add_executable(bench_npfem benchmarks/bench_npfem.cpp)
+  target_link_libraries(bench_npfem PRIVATE hemowalk_npfem hemowalk_rigid benchmark::benchmark)
+endif()
