@@ -646,6 +646,8 @@ std::vector<std::byte> Simulation<Real>::save() const {
   put(out, impulse_.data(), impulse_.size());
   const auto sort = markers_->save();
   put(out, sort.data(), sort.size());
+  const auto contacts = contact_ ? contact_->save() : std::vector<std::byte>{};
+  put(out, contacts.data(), contacts.size());
   for (const auto& group : groups_)
     std::visit(
         [&](const auto& g) {
@@ -669,6 +671,8 @@ void Simulation<Real>::load(View<const std::byte> state) {
   in.into(impulse_.data(), impulse_.size());
   const auto sort = in.take<std::byte>();
   markers_->load({sort.data(), sort.size()});
+  const auto contacts = in.take<std::byte>();
+  if (contact_) contact_->load({contacts.data(), contacts.size()});
   for (auto& group : groups_)
     std::visit(
         [&](auto& g) {

@@ -327,7 +327,7 @@ std::vector<std::byte> Contact<Real>::save() const {
 
 template <class Real>
 void Contact<Real>::load(View<const std::byte> state) {
-  state_->neighbours.load(state, state_->cloud);
+  state_->neighbours.restore(state, state_->cloud);
 }
 
 template <class Real>

@@ -392,7 +392,7 @@ std::vector<std::byte> Neighbours<Real>::save() const {
 }
 
 template <class Real>
-void Neighbours<Real>::load(View<const std::byte> state, Cloud<Real>& cloud) {
+void Neighbours<Real>::restore(View<const std::byte> state, Cloud<Real>& cloud) {
   valid_ = false;
   if (state.size == 0) return;
   const std::size_t origins = cloud.origin.size() * sizeof(Origin),

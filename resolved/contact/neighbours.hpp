@@ -95,7 +95,7 @@ class Neighbours {
   std::vector<std::byte> save() const;
   /// Searches at the saved positions. \p cloud has the bodies and lends its memory. \throws InputError if
   /// they differ.
-  void load(View<const std::byte> state, Cloud<Real>& cloud);
+  void restore(View<const std::byte> state, Cloud<Real>& cloud);
   /// Forgets the lists: bodies changed.
   void reset() { valid_ = false; }
   void set_domain(const Domain& domain) { domain_ = domain, valid_ = false; }
