@@ -73,6 +73,7 @@ class Pipeline {
       walk();
     }
     write();
+    require(trouble_.empty(), trouble_);  // said last: the report shows what could be done
     summary_.wall = seconds();
     return summary_;
   }
@@ -217,8 +218,11 @@ class Pipeline {
         }
         entry["calibrations"][kind] = calibration_json(result);
       } catch (const InputError& error) {
-        if (kind == first) throw;
-        entry["warnings"].push_back(kind + " is not calibrated: " + error.what());
+        const std::string text = kind + " is not calibrated: " + error.what();
+        entry["warnings"].push_back(text);
+        if (kind != first) continue;
+        fs::remove(folder_ / law_file(point));  // an older one would pass for this one's
+        if (trouble_.empty()) trouble_ = point.label + ": " + text;
       }
     }
     if (runs.size() < 3)
@@ -327,6 +331,7 @@ class Pipeline {
   PipelineSummary summary_;
   Json previous_ = Json::object(), points_ = Json::array(), walks_ = Json::array();
   bool final_ = false;
+  std::string trouble_;  ///< the first point whose main kind could not be calibrated
 };
 
 }  // namespace

@@ -41,11 +41,11 @@ std::vector<std::string> scene_problems(const data::Scene& scene) { return resol
 Cost scene_cost(const data::Scene& scene) {
   const Size size = size_of(scene);
   const double precision = scene.fluid.precision == data::Fluid::Precision::double_ ? 2 : 1;
-  // Per node 10 ns and per marker 120 ns on two cores; populations, velocity and force per node, about
-  // 700 bytes of state, weights and solver per marker.
+  // Per node 15 ns and per marker 300 ns on two cores, some seconds to pack; populations, velocity and force
+  // per node, about 700 bytes of state, weights and solver per marker.
   const double cores = std::max(1U, std::thread::hardware_concurrency());
   Cost cost;
-  cost.wall = size.steps * (size.nodes * 10e-9 * precision + size.markers * 120e-9) * 2 / cores;
+  cost.wall = 4 + size.steps * (size.nodes * 15e-9 * precision + size.markers * 300e-9) * 2 / cores;
   cost.memory = 50e6 + size.nodes * 140 * precision + size.markers * 700;
   cost.disk = 1e6 + scene.time.end / scene.time.sample * size.cells * 13 * 8 + cost.memory / 4;
   return cost;

@@ -37,9 +37,9 @@ function againstLiterature(p) {
   const verdicts = (calibrationOf(p) || {}).verdict || [], matched = verdicts.filter(v => v.matched_conditions);
   if (!verdicts.length) return "";
   if (!matched.length) return "no published value was measured under these conditions; those that come near stand in the chart below.";
-  const named = v => v.source.replace(/_/g, " "), times = v => (calibrationOf(p).core.D_m2_per_s / v.D_m2_per_s).toFixed(1) + " times theirs";
+  const named = v => v.source.replace(/_/g, " "), times = v => Number((calibrationOf(p).core.D_m2_per_s / v.D_m2_per_s).toPrecision(2)) + " times theirs";
   const parts = [["within two standard errors of ", v => isNumber(v.z) && Math.abs(v.z) < 2, v => `${named(v)} (${Math.abs(v.z).toFixed(1)})`],
-                 ["not of ", v => isNumber(v.z) && Math.abs(v.z) >= 2, v => `${named(v)} (${Math.abs(v.z).toFixed(1)} standard errors, ours is ${times(v)})`],
+                 ["not within two of ", v => isNumber(v.z) && Math.abs(v.z) >= 2, v => `${named(v)} (${Math.abs(v.z).toFixed(1)} standard errors, ours is ${times(v)})`],
                  ["no error is known for ", v => !isNumber(v.z), v => `${named(v)} (ours is ${times(v)})`]]
     .map(([words, test, text]) => matched.filter(test).length ? words + matched.filter(test).map(text).join(", ") : "").filter(t => t);
   return "of the sources under matching conditions, D is " + parts.join("; ") + "." + (failed(calibrationOf(p)) ? " The artefact gate failed: agreement proves nothing." : "");
@@ -48,16 +48,21 @@ function againstLiterature(p) {
 function headline() {
   page.append(el("div", {class: "brand"}, "hemowalk"), el("h1", {}, results.title || results.name || "Campaign"));
   page.append(el("p", {class: "lead"}, results.summary || "From trajectories of blood cells to their diffusion coefficient, and from there to transport at the scale of a device."));
-  for (const p of points) for (const k of kinds) {
-    const c = calibrationOf(p, k);
-    if (!failed(c)) continue;
-    page.append(el("div", {class: "banner bad"}, el("strong", {}, `Artefact gate failed: ${many ? p.label + ", " : ""}${kindName(k)}. `),
+  // One banner per point; kinds whose findings are the same (they share the flow) share the lines.
+  for (const p of points) {
+    const bad = kinds.filter(k => failed(calibrationOf(p, k)));
+    if (!bad.length) continue;
+    const lines = bad.flatMap(k => calibrationOf(p, k).gate.findings.filter(f => f.passed === false).map(f =>
+      ({k, text: `${f.name.replace(/_/g, " ")}: ${scientific(f.value)} (limit ${scientific(f.limit)})${f.note ? ". " + f.note : ""}`})));
+    page.append(el("div", {class: "banner bad"}, el("strong", {}, "Artefact gate failed" + (many ? `: ${p.label}. ` : ". ")),
       "The numbers below are given, but the trajectories carry something that is not diffusion.",
-      el("ul", {}, c.gate.findings.filter(f => f.passed === false).map(f =>
-        el("li", {}, `${f.name.replace(/_/g, " ")}: ${scientific(f.value)} (limit ${scientific(f.limit)})${f.note ? ". " + f.note : ""}`)))));
+      el("ul", {}, [...new Set(lines.map(l => l.text))].map(text => {
+        const of = lines.filter(l => l.text === text).map(l => kindName(l.k));
+        return el("li", {}, (of.length === kinds.length ? "" : of.join(", ") + ": ") + text);
+      }))));
   }
   const heads = el("div", {class: "heads"});
-  for (const p of points) for (const k of kinds) {
+  for (const k of kinds) for (const p of points) {
     const c = calibrationOf(p, k), core = c && c.core;
     if (!core || !isNumber(core.D_m2_per_s)) continue;
     const power = Math.floor(Math.log10(Math.abs(core.D_m2_per_s) || 1)), scale = 10 ** power;
