@@ -14,42 +14,51 @@ namespace {
 
 using data::Scene;
 
-constexpr double largest_wall_speed = 0.1;     // lattice units; compressibility error ~ Ma^2 = 3 u^2
+constexpr double largest_wall_speed = 0.1;        // lattice units; compressibility error ~ Ma^2 = 3 u^2
 constexpr double largest_capsule_reynolds = 0.1;  // end of the Stokes regime (method 6)
-constexpr double widest_mesh = 2.2;            // mean edge in dx: wider meshes leak through phi4
-constexpr double narrowest_mesh = 0.2;         // mean edge in dx: markers that phi4 cannot tell apart
+constexpr double widest_mesh = 2.2;               // mean edge in dx: wider meshes leak through phi4
+constexpr double narrowest_mesh = 0.2;            // mean edge in dx: markers that phi4 cannot tell apart
 
 void check_available(const Scene& scene, std::vector<std::string>& problems) {
   using Geometry = data::Domain::Geometry;
   if (scene.domain.geometry == Geometry::tube || scene.domain.geometry == Geometry::stl)
     problems.push_back("domain.geometry is not available in this version (slab and periodic are) use slab");
   if (scene.coupling.scheme != data::Coupling::Scheme::conservative)
-    problems.push_back("coupling.scheme is not available in this version (only conservative is) use conservative");
+    problems.push_back(
+        "coupling.scheme is not available in this version (only conservative is) use conservative");
   if (scene.contact.model == data::Contact::Model::particle_in_kernel)
-    problems.push_back("contact.model particle_in_kernel belongs to coupling.scheme paper (not available in this version) use pairwise");
-  if (scene.place.fluid != Place::host || scene.place.coupling != Place::host || scene.place.solid != Place::host)
-    problems.push_back("place: device is not available in this version (the kernels compile, no driver runs them yet) use host");
+    problems.push_back(
+        "contact.model particle_in_kernel belongs to coupling.scheme paper (not available in this version) "
+        "use pairwise");
+  if (scene.place.fluid != Place::host || scene.place.coupling != Place::host ||
+      scene.place.solid != Place::host)
+    problems.push_back(
+        "place: device is not available in this version (the kernels compile, no driver runs them yet) use "
+        "host");
 }
 
 void check_flow(const Scene& scene, const LatticeUnits& units, std::vector<std::string>& problems) {
   const ibm::Faces faces = make_faces(scene, units);
   double speed = std::max(std::abs(faces.lower_wall[2]), std::abs(faces.upper_wall[2]));
   for (int i = 1; i < 8; ++i)
-    speed = std::max(speed, std::abs(steady_velocity(scene, units, units.length(scene.domain.size[1]) * i / 8)));
+    speed =
+        std::max(speed, std::abs(steady_velocity(scene, units, units.length(scene.domain.size[1]) * i / 8)));
   if (speed > largest_wall_speed)
-    problems.push_back(fmt::format(
-        "the fastest flow is {:.3g} lattice units per step (limit {:g}: the fluid would be compressible) lower acceleration to "
-        "{:.3g} or less{}",
-        speed, largest_wall_speed, scene.acceleration * largest_wall_speed / speed,
-        scene.flow.type == data::Flow::Type::couette && scene.flow.walls == data::Flow::Walls::top
-            ? ", or let both walls move (flow.walls: both)"
-            : ""));
+    problems.push_back(
+        fmt::format("the fastest flow is {:.3g} lattice units per step (limit {:g}: the fluid would be "
+                    "compressible) lower acceleration to "
+                    "{:.3g} or less{}",
+                    speed, largest_wall_speed, scene.acceleration * largest_wall_speed / speed,
+                    scene.flow.type == data::Flow::Type::couette && scene.flow.walls == data::Flow::Walls::top
+                        ? ", or let both walls move (flow.walls: both)"
+                        : ""));
   const double rate = scene.flow.type == data::Flow::Type::couette ? scene.flow.shear_rate : 0;
   const double reynolds = scene.acceleration * rate * std::pow(3.91e-6, 2) / scene.fluid.kinematic_viscosity;
   if (!scene.cells.kinds.empty() && reynolds > largest_capsule_reynolds)
-    problems.push_back(fmt::format("the capsule Reynolds number is {:.3g} at this acceleration (limit {:g}: not Stokes flow any more) "
-                                   "lower acceleration to {:.3g}",
-                                   reynolds, largest_capsule_reynolds, scene.acceleration * largest_capsule_reynolds / reynolds));
+    problems.push_back(fmt::format(
+        "the capsule Reynolds number is {:.3g} at this acceleration (limit {:g}: not Stokes flow any more) "
+        "lower acceleration to {:.3g}",
+        reynolds, largest_capsule_reynolds, scene.acceleration * largest_capsule_reynolds / reynolds));
 }
 
 void check_cells(const Scene& scene, const LatticeUnits& units, std::vector<std::string>& problems) {
@@ -63,15 +72,17 @@ void check_cells(const Scene& scene, const LatticeUnits& units, std::vector<std:
     }
     const double ratio = mesh::mean_edge(rest);
     if (ratio > widest_mesh || ratio < narrowest_mesh)
-      problems.push_back(fmt::format("cells.kinds.{}: the mesh's mean edge is {:.2f} dx (it must lie in [{:g}, {:g}] or membranes leak "
-                                     "or jitter) choose subdivision {}",
-                                     kind.name, ratio, narrowest_mesh, widest_mesh,
-                                     std::max(2, static_cast<int>(std::lround(kind.subdivision * ratio / 1.5)))));
+      problems.push_back(fmt::format(
+          "cells.kinds.{}: the mesh's mean edge is {:.2f} dx (it must lie in [{:g}, {:g}] or membranes leak "
+          "or jitter) choose subdivision {}",
+          kind.name, ratio, narrowest_mesh, widest_mesh,
+          std::max(2, static_cast<int>(std::lround(kind.subdivision * ratio / 1.5)))));
     const double radius = mesh::bounding_radius(rest);
     for (int d = 0; d < 3; ++d)
       if (units.length(scene.domain.size[d]) < 2 * radius)
-        problems.push_back(fmt::format("domain.size.{} is {:.3g} um (a {} is {:.3g} um across and would meet itself) enlarge the box", d,
-                                       1e6 * scene.domain.size[d], kind.name, 2e6 * units.to_length(radius)));
+        problems.push_back(fmt::format(
+            "domain.size.{} is {:.3g} um (a {} is {:.3g} um across and would meet itself) enlarge the box", d,
+            1e6 * scene.domain.size[d], kind.name, 2e6 * units.to_length(radius)));
   }
 }
 
@@ -82,7 +93,8 @@ std::vector<std::string> preflight(const Scene& scene) {
   const LatticeUnits units(scene);
   check_available(scene, problems);
   if (!(scene.fluid.tau > 0.5))
-    problems.push_back(fmt::format("fluid.tau is {:g} (the viscosity would not be positive) choose tau > 0.5", scene.fluid.tau));
+    problems.push_back(fmt::format("fluid.tau is {:g} (the viscosity would not be positive) choose tau > 0.5",
+                                   scene.fluid.tau));
   try {
     make_block(scene);
   } catch (const InputError& error) {

@@ -5,16 +5,16 @@
 
 namespace hemowalk::resolved {
 
-/// A smeared sheet reads its own kick only in part: phi4 returns 3/16 of J/(rho A dx) where a no-slip marker needs
-/// all of it. What the last step's kick should have added, c = I[F_prev/(2 rho)] - J_prev/a, is put back, theta_n of
-/// it along the normal and theta_t across: w = I[u*] + theta_t c + (theta_n - theta_t) n (n.c). theta < 1 keeps
-/// marker modes that the kernel cannot see from growing.
+/// A smeared sheet reads its own kick only in part: phi4 returns 3/16 of J/(rho A dx) where a no-slip marker
+/// needs all of it. What the last step's kick should have added, c = I[F_prev/(2 rho)] - J_prev/a, is put
+/// back, theta_n of it along the normal and theta_t across: w = I[u*] + theta_t c + (theta_n - theta_t) n
+/// (n.c). theta < 1 keeps marker modes that the kernel cannot see from growing.
 template <class T>
 struct SlipCorrection {
   T theta_n, theta_t;
 
-  /// \p u = I[u*], \p f = I[F_prev/2], \p J the marker's last impulse, \p inverse_a = 1/a, \p n its unit normal;
-  /// three components each. Writes \p w.
+  /// \p u = I[u*], \p f = I[F_prev/2], \p J the marker's last impulse, \p inverse_a = 1/a, \p n its unit
+  /// normal; three components each. Writes \p w.
   HEMO_HD void operator()(const T u[3], const T f[3], const T J[3], T inverse_a, const T n[3], T w[3]) const {
     T c[3];
     for (int d = 0; d < 3; ++d) c[d] = f[d] - J[d] * inverse_a;

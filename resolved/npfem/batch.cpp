@@ -327,15 +327,17 @@ template <class Real>
 /// angular momentum (about x^n), whether the iteration has converged or not.
 template <class Real>
 [[gnu::flatten]] void BatchKernel<Real>::project(const BatchFields<Real>& b, const Frame& frame) {
-  mesh::Momentum<P> solved;
+  // The momentum of the difference, not the difference of momenta: its rounding does not add up over steps.
+  mesh::Momentum<P> missing;
   for_chunks(t_.vertices, [&](int begin, int end) {
     mesh::Momentum<P> part;
     for (int k = begin; k < end; ++k)
-      part.add(t_.metric[k], load3(b.offset, k), t_.inverse_h * load3(s_.increment.data(), k));
-    solved.add(part);
+      part.add(t_.metric[k], load3(b.offset, k),
+               load3(b.predicted, k) - t_.inverse_h * load3(s_.increment.data(), k));
+    missing.add(part);
   });
-  const auto was = frame.body.motion(solved);
-  const V velocity = frame.motion.velocity - was.velocity, spin = frame.motion.spin - was.spin;
+  const auto lost = frame.body.motion(missing);
+  const V velocity = lost.velocity, spin = lost.spin;
   for (int k = 0; k < t_.vertices; ++k)
     store3(t_.inverse_h * load3(s_.increment.data(), k) +
                (velocity + cross(spin, load3(b.offset, k) - frame.body.centre())),

@@ -19,7 +19,8 @@ namespace hemowalk::rigid {
 /// k a).
 struct BodyType {
   mesh::TriangleMesh rest;
-  std::vector<double> mass;    ///< m_k: own inertia, for diagnostics; the step sees it through v_pred and metric
+  std::vector<double>
+      mass;  ///< m_k: own inertia, for diagnostics; the step sees it through v_pred and metric
   std::vector<double> metric;  ///< m_k + k a_k: the mass of the implicit step, > 0
   double h = 1;                ///< solid time step
 };

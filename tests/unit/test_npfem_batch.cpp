@@ -207,7 +207,7 @@ TEST(SinglePrecision, SlowCellFarFromTheOriginDriftsRight) {
   Membranes<Real> cells(std::make_shared<const CellType>(rest, m, metric, 1));
   cells.add(0, {20, 998, 20}, mesh::identity_rotation);  // drifts
   cells.add(1, {20, 998, 20}, mesh::identity_rotation);  // spins in free flight: v_pred = v
-  const double speed = 1.25e-5, spin = 1e-7 / 7.82;  // a fifth of an ulp of the offsets per step
+  const double speed = 1.25e-5, spin = 1e-7 / 7.82;      // a fifth of an ulp of the offsets per step
   std::vector<Vec3> turning;
   for (const auto& p : rest.vertices) turning.push_back(mesh::cross({spin, 0, 0}, p));
   cells.set_velocities(0, std::vector<Vec3>(rest.vertices.size(), Vec3{0, speed, 0}));

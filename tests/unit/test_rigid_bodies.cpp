@@ -61,7 +61,8 @@ TEST(RigidBodies, KeepTheMomentaOfAnyVelocityAndMoveByTheirVelocity) {
   }
 }
 
-/// Free flight of an asymmetric top: angular momentum to round-off, energy with an error of second order in h.
+/// Free flight of an asymmetric top: angular momentum to round-off, energy with an error of second order in
+/// h.
 TEST(RigidBodies, FreeTopKeepsItsAngularMomentum) {
   double drift[2];
   for (int level = 0; level < 2; ++level) {
