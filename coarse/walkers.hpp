@@ -78,8 +78,8 @@ class Walkers {
   std::vector<std::array<std::int32_t, 2>> absorbed_;  ///< [blocks] taken out so far
 };
 
-/// Seconds this machine needs for one block of random numbers of the Gaussian walk per lane set: the ceiling
-/// the walk is measured against. Returns normal numbers per second on all threads.
+/// The ceiling the walk is measured against: normal numbers per second of processor time, made the walk's way
+/// and only summed up; added over all threads, each working for \p seconds of its own processor time.
 double normal_numbers_per_second(double seconds);
 
 }  // namespace hemowalk::coarse

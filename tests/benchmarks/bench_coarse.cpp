@@ -50,15 +50,16 @@ void row(const std::string& name, const SlabLaw& law, const Face& bottom, const 
   Walkers w(c, law, s);
   double best = 0, best_fraction = 0, best_cpu = 0;
   for (int third = 0; third < 3; ++third) {
-    const double ceiling = normal_numbers_per_second(seconds / 9);
+    const double ceiling = normal_numbers_per_second(seconds / 9) / omp_get_max_threads();
     const double start = now(), cpu_start = cpu_now();
     const std::int64_t before = w.steps_walked();
     while (now() - start < seconds / 3) w.advance_to(w.step() + 512);
     const auto walked = static_cast<double>(w.steps_walked() - before);
     const double rate = walked / (now() - start);
-    best_cpu = std::max(best_cpu, walked / (cpu_now() - cpu_start));
+    const double rate_cpu = walked / (cpu_now() - cpu_start);
+    best_cpu = std::max(best_cpu, rate_cpu);
     best = std::max(best, rate);
-    best_fraction = std::max(best_fraction, rate / ceiling);
+    best_fraction = std::max(best_fraction, rate_cpu / ceiling);
   }
   fmt::print("| {} | {:.0f} | {:.2f} | {:.0f} |\n", name, best / 1e6, best_fraction, best_cpu / 1e6);
 }
