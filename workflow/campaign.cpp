@@ -269,6 +269,74 @@ void describe_input(Campaign& c, Value value, const std::vector<Run>& runs) {
   c.input_sha256 = sha256(yaml::physical_text(value) + hashed);
 }
 
+/// Puts scene and case files in the place of their names and applies the overrides: those that may name files
+/// first, then those that reach inside the files. Returns where the cases come from.
+std::vector<Inlined> complete_document(Node& root, Campaign& c, const std::string& folder,
+                                       const std::vector<std::string>& overrides, Problems& problems) {
+  const auto may_name_a_file = [](const std::string& o) {
+    const std::string key = o.substr(0, o.find('='));
+    return key == "scene" || key == "coarse" ||
+           (key.rfind("coarse.", 0) == 0 && yaml::split_path(key).size() == 2);
+  };
+  std::vector<std::string> first, second;
+  for (const std::string& o : overrides) (may_name_a_file(o) ? first : second).push_back(o);
+  yaml::apply_overrides(root, campaign_format(), first, problems);
+  c.scene_folder = folder;
+  if (Node* scene = root.find("scene")) {
+    if (scene->type == Node::Type::null)
+      problems.add(scene->mark, "scene: no value (a file or a map is expected) write scene: FILE");
+    c.scene_folder = inline_file(*scene, folder, "", problems).folder;
+  }
+  std::vector<Inlined> cases;
+  if (Node* list = root.find("coarse"))
+    for (Node& one : list->items)
+      cases.push_back(inline_file(one, folder, "coarse" + std::to_string(cases.size() + 1), problems));
+  yaml::apply_overrides(root, campaign_format(), second, problems);
+  return cases;
+}
+
+/// What a campaign starts from: a scene with its sweep, or trajectories.
+void read_start(Campaign& c, const Node& root, Value& value, const std::string& folder, Problems& problems) {
+  const Node *scene = root.find("scene"), *sweep = root.find("sweep");
+  if (scene) c.scene = *scene;
+  add_format(c.scene, data::scene_format());
+  c.zip = value.has("zip") && value["zip"].boolean();
+  c.replicas = value.has("replicas") ? static_cast<int>(value["replicas"].integer()) : 1;
+  c.sweep = read_sweep(sweep, problems);
+  check_sweep(c, sweep, problems);
+  const auto sources = value.members.find("trajectories");
+  const bool any_source = sources != value.members.end() && !sources->second.items.empty();
+  if (value.type == Value::Type::map && !scene && !any_source)
+    problems.add(root.mark,
+                 "neither `scene` nor `trajectories` (a campaign starts from one of them) add scene: FILE");
+  if (scene && any_source)
+    problems.add(sources->second.mark,
+                 "`scene` and `trajectories` together (a campaign starts from one of them) remove one");
+  if (!scene && !c.sweep.empty())
+    problems.add(sweep->mark, "`sweep` without `scene` (its keys are those of a scene) remove it");
+  for (std::size_t i = 0; any_source && i < sources->second.items.size(); ++i)
+    if (const auto source = read_source(sources->second.items[i], i, folder, problems)) {
+      const auto copies = replicated(*source, c.replicas, i);
+      c.sources.insert(c.sources.end(), copies.begin(), copies.end());
+    }
+}
+
+void check_layer(const Value& value, Problems& problems) {
+  const Value* layer = value.find("calibrate.layer");
+  if (layer && layer->type == Value::Type::list && layer->items[0].number() >= layer->items[1].number())
+    problems.add(layer->mark, "calibrate.layer: it ends below its start (lower height first) swap the two");
+}
+
+/// The rest, once everything is known to be valid.
+void read_settings(Campaign& c, const Value& value) {
+  const auto whole = [&](const char* path) { return static_cast<int>(value[path].integer()); };
+  c.calibrate = calibration_of(value["calibrate"]);
+  c.launcher = {value["launcher.type"].choice<Launcher::Type>(), whole("launcher.slots"),
+                whole("launcher.ranks"), whole("launcher.threads")};
+  c.on_failure = {value["on_failure.action"].choice<OnFailureAction>(), whole("on_failure.attempts")};
+  c.out = value.has("out") ? value["out"].text() : "out/" + c.name;
+}
+
 }  // namespace
 
 std::string Campaign::title() const {
@@ -326,64 +394,16 @@ Campaign parse_campaign(const std::string& text, const std::string& name,
   Campaign c;
   const std::string folder = data::folder_of(name);
   Node root = yaml::parse(text, name, problems);
-  // First those that may name files, then those that reach inside the files.
-  const auto may_name_a_file = [](const std::string& o) {
-    const std::string key = o.substr(0, o.find('='));
-    return key == "scene" || key == "coarse" ||
-           (key.rfind("coarse.", 0) == 0 && yaml::split_path(key).size() == 2);
-  };
-  std::vector<std::string> first, second;
-  for (const std::string& o : overrides) (may_name_a_file(o) ? first : second).push_back(o);
-  yaml::apply_overrides(root, campaign_format(), first, problems);
-  c.scene_folder = folder;
-  if (Node* scene = root.find("scene")) c.scene_folder = inline_file(*scene, folder, "", problems).folder;
-  std::vector<Inlined> case_origins;
-  if (Node* cases = root.find("coarse"))
-    for (Node& one : cases->items)
-      case_origins.push_back(
-          inline_file(one, folder, "coarse" + std::to_string(case_origins.size() + 1), problems));
-  yaml::apply_overrides(root, campaign_format(), second, problems);
-
+  const auto case_origins = complete_document(root, c, folder, overrides, problems);
   Value value = yaml::validate(root, campaign_shell_format(), problems);
   c.name = value.has("name") ? value["name"].text() : std::filesystem::path(name).stem().string();
-  const Node *scene = root.find("scene"), *sweep = root.find("sweep");
-  if (scene) c.scene = *scene;
-  add_format(c.scene, data::scene_format());
-  c.zip = value.has("zip") && value["zip"].boolean();
-  c.replicas = value.has("replicas") ? static_cast<int>(value["replicas"].integer()) : 1;
-  c.sweep = read_sweep(sweep, problems);
-  const auto sources = value.members.find("trajectories");
-  const bool any_source = sources != value.members.end() && !sources->second.items.empty();
-  if (value.type == Value::Type::map && !scene && !any_source)
-    problems.add(root.mark,
-                 "neither `scene` nor `trajectories` (a campaign starts from one of them) add scene: FILE");
-  if (scene && any_source)
-    problems.add(sources->second.mark,
-                 "`scene` and `trajectories` together (a campaign starts from one of them) remove one");
-  if (!scene && !c.sweep.empty())
-    problems.add(sweep->mark, "`sweep` without `scene` (its keys are those of a scene) remove it");
-  for (std::size_t i = 0; any_source && i < sources->second.items.size(); ++i)
-    if (const auto source = read_source(sources->second.items[i], i, folder, problems)) {
-      const auto copies = replicated(*source, c.replicas, i);
-      c.sources.insert(c.sources.end(), copies.begin(), copies.end());
-    }
-  if (const Value* layer = value.find("calibrate.layer"); layer && layer->type == Value::Type::list)
-    if (layer->items[0].number() >= layer->items[1].number())
-      problems.add(layer->mark, "calibrate.layer: it ends below its start (lower height first) swap the two");
+  read_start(c, root, value, folder, problems);
+  check_layer(value, problems);
   c.coarse = read_cases(root.find("coarse"), case_origins, problems);
-  check_sweep(c, sweep, problems);
   std::vector<Run> runs;
   if (points_of(c) * static_cast<std::size_t>(c.replicas) <= most_runs) runs = expand(c, problems);
   problems.throw_if_any();
-
-  c.calibrate = calibration_of(value["calibrate"]);
-  c.launcher = {value["launcher.type"].choice<Launcher::Type>(),
-                static_cast<int>(value["launcher.slots"].integer()),
-                static_cast<int>(value["launcher.ranks"].integer()),
-                static_cast<int>(value["launcher.threads"].integer())};
-  c.on_failure = {value["on_failure.action"].choice<OnFailureAction>(),
-                  static_cast<int>(value["on_failure.attempts"].integer())};
-  c.out = value.has("out") ? value["out"].text() : "out/" + c.name;
+  read_settings(c, value);
   c.warnings = problems.warnings();
   describe_input(c, std::move(value), runs);
   return c;

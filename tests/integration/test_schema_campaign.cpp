@@ -222,6 +222,8 @@ sceen: x
 }
 
 TEST(SchemaCampaign, WhatItStartsFrom) {
+  EXPECT_TRUE(contains(campaign_errors("scene:\n"), "c.yaml:2:1: scene: no value"));
+  EXPECT_TRUE(contains(campaign_errors("scene: [1]\n"), "c.yaml:2:8: "));
   EXPECT_TRUE(contains(campaign_errors("replicas: 2\n"), "neither `scene` nor `trajectories`"));
   EXPECT_TRUE(contains(campaign_errors(inline_scene + "trajectories: [{synthetic: {}}]\n"), "together"));
   EXPECT_TRUE(contains(campaign_errors("trajectories: [{synthetic: {}}]\nsweep: {fluid.tau: [1, 2]}\n"),
