@@ -26,6 +26,12 @@ void check_available(const Scene& scene, std::vector<std::string>& problems) {
   if (scene.coupling.scheme != data::Coupling::Scheme::conservative)
     problems.push_back(
         "coupling.scheme is not available in this version (only conservative is) use conservative");
+  if (scene.coupling.scheme == data::Coupling::Scheme::conservative && scene.coupling.solid_every > 1 &&
+      scene.coupling.retraction > 0)
+    problems.push_back(
+        "coupling.solid_every > 1 blows up with a retracted coupling surface (measured: "
+        "docs/evidence/resolved.md) use "
+        "solid_every: 1, or retraction: 0");
   if (scene.contact.model == data::Contact::Model::particle_in_kernel)
     problems.push_back(
         "contact.model particle_in_kernel belongs to coupling.scheme paper (not available in this version) "
