@@ -57,7 +57,8 @@ class MemoryProblem {
       lag_.push_back(s.lag);
       weight_.push_back(1 / (sigma * sigma));
     }
-    for (double T = e.interval / 2; T <= 0.5 * long_lag; T *= 1.05) {
+    // Longer memories look like a constant D over these lags: their D would be an extrapolation.
+    for (double T = e.interval / 2; T <= 0.25 * long_lag; T *= 1.05) {
       times_.push_back(T);
       for (double t : lag_) shape_.push_back(memory_shape(t, T));
     }

@@ -39,10 +39,12 @@ struct Tally {
 };
 
 void print(const std::string& scenario, const std::string& name, const Tally& t) {
-  std::printf("| %-22s | %-14s | %4zu | %.3f +- %.3f | %.3f | %.3f | %4.1f %% |\n", scenario.c_str(),
+  std::printf("| %-22s | %-14s | %4zu | %.3f +- %.3f | %.4f | %.4f | %4.1f %% |\n", scenario.c_str(),
               name.c_str(), t.D.size(), mean(t.D), standard_error(t.D), standard_deviation(t.D),
               t.sigma / static_cast<double>(t.D.size()), 100 * t.coverage());
 }
+
+void PrintTo(const Scenario& s, std::ostream* out) { *out << s.name; }
 
 class Coverage : public testing::TestWithParam<Scenario> {};
 
@@ -67,28 +69,29 @@ TEST_P(Coverage, RecommendedEstimateIsRightWithinItsInterval) {
         tally[x.name].add(x, x.name == "without_jumps" ? total - jump_D(s) : total);
     tally["recommended"].add(recommend(all, lags).estimate, total);
   }
-  for (const auto& [name, t] : tally) print(scenario.name, name, t);
+  for (const auto& [name, t] : tally)
+    if (t.D.size() >= 20) print(scenario.name, name, t);  // `memory` only where it is seen
   const Tally& best = tally["recommended"];
   EXPECT_NEAR(mean(best.D), 1, 0.02 + 2 * standard_error(best.D));
   EXPECT_GT(best.coverage(), 0.63);
   EXPECT_LT(best.coverage(), 0.73);
 }
 
-Scenario scenario(const std::string& name, void (*change)(Synthetic&)) {
+Scenario scenario(const std::string& name, std::uint64_t seed, void (*change)(Synthetic&)) {
   Scenario s{name, {}};
-  s.truth.seed = 100000 * (1 + std::hash<std::string>{}(name) % 1000);
+  s.truth.seed = seed;
   change(s.truth);
   return s;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Scenarios, Coverage,
-    testing::Values(scenario("free", [](Synthetic& s) { s.gap = 500e-6; }),
-                    scenario("reflecting slab 50 um", [](Synthetic&) {}),
-                    scenario("reflecting slab 20 um", [](Synthetic& s) { s.gap = 20e-6; }),
-                    scenario("D(y), contrast 0.5", [](Synthetic& s) { s.D_contrast = 0.5; }),
-                    scenario("persistent, 10 ms", [](Synthetic& s) { s.memory = 10e-3; }),
-                    scenario("0.35 % jumps of 3 um", [](Synthetic& s) {
+    testing::Values(scenario("free", 1000000, [](Synthetic& s) { s.gap = 200e-6; }),
+                    scenario("reflecting slab 50 um", 2000000, [](Synthetic&) {}),
+                    scenario("reflecting slab 20 um", 3000000, [](Synthetic& s) { s.gap = 20e-6; }),
+                    scenario("D(y), contrast 0.5", 4000000, [](Synthetic& s) { s.D_contrast = 0.5; }),
+                    scenario("persistent, 10 ms", 5000000, [](Synthetic& s) { s.memory = 10e-3; }),
+                    scenario("0.35 % jumps of 3 um", 6000000, [](Synthetic& s) {
                       s.jump_fraction = 0.0035;
                       s.jump_size = 3e-6;
                     })));
