@@ -43,7 +43,7 @@ struct Nearest {
 
 /// mask ? yes : no, lane by lane for packs.
 template <class Mask, class T>
-HEMO_HD inline T select(const Mask& mask, const T& yes, const T& no) {
+HEMO_HD HEMO_INLINE T select(const Mask& mask, const T& yes, const T& no) {
   if constexpr (std::is_same_v<Mask, bool>) {
     return mask ? yes : no;
   } else {
@@ -55,7 +55,7 @@ HEMO_HD inline T select(const Mask& mask, const T& yes, const T& no) {
 
 /// Parameter in [0, 1] of the point of a segment that is nearest, from t = (p . e) and ee = |e|^2.
 template <class T>
-HEMO_HD inline T clamped_ratio(const T& t, const T& ee) {
+HEMO_HD HEMO_INLINE T clamped_ratio(const T& t, const T& ee) {
   const T r = t / ee;
   const T low = select(r < T(0), T(0), r);
   return select(low > T(1), T(1), low);
@@ -64,8 +64,8 @@ HEMO_HD inline T clamped_ratio(const T& t, const T& ee) {
 /// Branch-free: the foot of the perpendicular when it falls inside, else the best of the three edges. The
 /// final difference vector is formed from coordinates, not from squares, so small gaps keep their accuracy.
 template <class T>
-HEMO_HD inline Nearest<T> nearest_on_triangle(const Point<T>& p, const Point<T>& a, const Point<T>& b,
-                                              const Point<T>& c) {
+HEMO_HD HEMO_INLINE Nearest<T> nearest_on_triangle(const Point<T>& p, const Point<T>& a, const Point<T>& b,
+                                                   const Point<T>& c) {
   const Point<T> ab = b - a, ac = c - a, ap = p - a;
   const T bb = dot(ab, ab), bc = dot(ab, ac), cc = dot(ac, ac), pb = dot(ap, ab), pc = dot(ap, ac);
   // Foot of the perpendicular in barycentric weights times det.
