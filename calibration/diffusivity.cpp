@@ -467,14 +467,21 @@ Estimate without_jumps(const Ensemble& e, const Layer& layer, double lag, const 
 }
 
 Estimate local(const Estimate& plateau, const LocalFit& fit, const Layer& layer) {
+  const auto factor_of = [&](const LocalLaw& law) {
+    return law.mean_D(layer.low, layer.high) * 2 * fit.lag /
+           Propagator(law, fit.cells, fit.lag).msd(layer.low, layer.high);
+  };
   Estimate out = plateau;
   out.name = "local";
-  const double factor = fit.law.mean_D(layer.low, layer.high) * 2 * fit.lag /
-                        Propagator(fit.law, fit.cells, fit.lag).msd(layer.low, layer.high);
+  const double factor = factor_of(fit.law);
+  // The correction grows with D itself, so the error grows more than D does.
+  LocalLaw faster = fit.law;
+  faster.D_scale *= 1.05;
+  const double stretch = factor * (1 + std::log(factor_of(faster) / factor) / std::log(1.05));
   out.D *= factor;
-  out.sigma *= factor;
-  out.sigma_between_runs *= factor;
-  for (double& c : out.ci68) c *= factor;
+  out.sigma *= stretch;
+  out.sigma_between_runs *= stretch;
+  for (double& c : out.ci68) c = out.D + stretch * (c - plateau.D);
   char note[80];
   std::snprintf(note, sizeof note, "plateau times %.4f for walls and D(y) within the lag", factor);
   out.note = note;
