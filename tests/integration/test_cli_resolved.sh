@@ -14,7 +14,7 @@ under_way() { for _ in $(seq 1200); do case "$(progress "$1")" in 0.[1-9]*) retu
 # The child of process $1 that runs the solver.
 child_of() { cat "/proc/$1/task/$1/children" 2>/dev/null; }
 # Everything calibrate sees in the only run of $1: equal text, equal trajectories to the bit.
-seen() { "$program" calibrate "$1"/runs/* --t0 0.5ms --lag 0.5ms --bootstrap 10 --out "$1" --json 2>/dev/null | grep -vE 'wall_s|law_file'; }
+seen() { "$program" calibrate "$1"/runs/* --t0 1ms --lag 1ms --bootstrap 20 --out "$1" --json 2>/dev/null | grep -vE 'wall_s|law_file'; }
 
 cat >scene.yaml <<'YAML'
 format: hemowalk.campaign/1
@@ -23,8 +23,8 @@ scene:
   domain: {size: [12 um, 12 um, 12 um]}
   flow: {type: couette, shear_rate: 100 1/s, walls: both}
   cells: {hematocrit: 0.22, platelets_per_rbc: 1}
-  time: {end: 3 ms, sample: 0.05 ms, profile: 1 ms}
-calibrate: {t0: 0.5 ms, lag: 0.5 ms, bootstrap: 10}
+  time: {end: 6 ms, sample: 0.1 ms, profile: 2 ms}
+calibrate: {t0: 1 ms, lag: 1 ms, bootstrap: 20}
 on_failure: {action: retry, attempts: 2}
 YAML
 
