@@ -88,8 +88,13 @@ void set_profile(Calibration& c, const LocalFit& fit) {
   }
   D.resize(std::min(D.size(), law_draws));
   v.resize(std::min(v.size(), law_draws));
-  p.D_draws = std::move(D);
-  p.v_draws = std::move(v);
+  // A resample without displacements somewhere has no law there; a file holds numbers only.
+  const auto finite = [](const std::vector<double>& x) {
+    return std::all_of(x.begin(), x.end(), [](double y) { return std::isfinite(y); });
+  };
+  for (std::size_t b = 0; b < D.size(); ++b)
+    if (finite(D[b]) && finite(v[b]))
+      p.D_draws.push_back(std::move(D[b])), p.v_draws.push_back(std::move(v[b]));
 }
 
 /// Cell-free layer from the red cells' profile (unknown without one), and what happens near the walls.
