@@ -98,14 +98,8 @@ void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
   const data::Scene& scene = simulation.scene();
   const Momentum m = simulation.momentum();
   const lbm::Totals totals = simulation.fluid().totals();
-  std::array<double, 3> total{};
-  double scale = 0;
-  for (int d = 0; d < 3; ++d) {
-    total[d] = m.fluid[d] + m.cells[d] + m.to_lower_wall[d] + m.to_upper_wall[d] - m.from_body_force[d] -
-               m.from_loads[d];
-    scale += std::abs(m.to_lower_wall[d]) + std::abs(m.to_upper_wall[d]) + std::abs(m.from_body_force[d]) +
-             std::abs(m.from_loads[d]) + std::abs(m.fluid[d]);
-  }
+  const std::array<double, 3> total = m.total();
+  const double scale = m.scale();
   if (!started_) {
     momentum_start_ = total, mass_start_ = totals.mass, started_ = true;
   }

@@ -2,6 +2,7 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 hemowalk_library(hemowalk_resolved
   SOURCES
+    bench.cpp
     build.cpp
     checkpoint.cpp
     packing.cpp

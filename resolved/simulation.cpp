@@ -240,26 +240,7 @@ template <class Real>
 void Simulation<Real>::start_flow() {
   fluid_.initialise([&](double y) { return steady_velocity(scene_, units_, y); });
   fluid_.moments(velocity_.view());
-  complete_velocity();
-}
-
-/// velocity_ = u* + theta/2 F (interior), then its halo: what markers read.
-template <class Real>
-void Simulation<Real>::complete_velocity() {
-  if (one_theta_ && bodies_ > 0) {
-    const Real weight = static_cast<Real>(0.5 * scene_.coupling.theta_n);
-    const Node4<Real>* force = force_.data();
-    Node4<Real>* velocity = velocity_.data();
-#pragma omp parallel for schedule(static)
-    for (int k = 0; k < block_.nz; ++k)
-      for (int j = 0; j < block_.ny; ++j) {
-        const std::size_t row = block_.at(0, j, k);
-        const Real* f = &force[row].x;
-        Real* u = &velocity[row].x;
-        for (int i = 0; i < 4 * block_.nx; ++i) u[i] += weight * f[i];
-      }
-  }
-  ibm::fill_velocity_halo(block_, faces_, velocity_.view());
+  ibm::fill_velocity_halo(block_, faces_, velocity_.view());  // no force yet: u* is what markers read
 }
 
 template <class Real>
@@ -513,21 +494,37 @@ void Simulation<Real>::step() {
     Stopwatch watch(timings_.fluid);
     const View<const Node4<Real>> force =
         bodies_ > 0 ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
+    // Interpolation reads u* + theta/2 F where one theta serves both directions.
+    const Real share = one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n) : Real(0);
     for (int k = 0; k < scene_.coupling.solid_every; ++k) {
-      fluid_.advance(force, velocity_.view());
+      fluid_.advance(force, velocity_.view(), k + 1 == scene_.coupling.solid_every ? share : Real(0));
       const auto impulse = fluid_.wall_impulse();
       taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
       for (int d = 0; d < 3; ++d)
         taken_.from_body_force[d] +=
             fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
     }
-    complete_velocity();
+    ibm::fill_velocity_halo(block_, faces_, velocity_.view());
   }
   fluid_steps_ += scene_.coupling.solid_every;
   timings_.steps += scene_.coupling.solid_every;
   const double after =
       timings_.fluid + timings_.interpolation + timings_.spreading + timings_.solid + timings_.contact;
   timings_.other += omp_get_wtime() - start - (after - before);
+}
+
+std::array<double, 3> Momentum::total() const {
+  std::array<double, 3> sum{};
+  for (int d = 0; d < 3; ++d)
+    sum[d] = fluid[d] + cells[d] + to_lower_wall[d] + to_upper_wall[d] - from_body_force[d] - from_loads[d];
+  return sum;
+}
+
+double Momentum::scale() const {
+  double sum = 0;
+  for (const auto* part : {&to_lower_wall, &to_upper_wall, &from_body_force, &from_loads, &fluid})
+    for (const double component : *part) sum += std::abs(component);
+  return sum;
 }
 
 template <class Real>

@@ -49,7 +49,7 @@ struct Group {
 
 /// Where the time of a step goes, seconds since the last reset.
 struct Timings {
-  double fluid = 0, interpolation = 0, spreading = 0, solid = 0, contact = 0, other = 0;
+  double fluid = 0, interpolation = 0, spreading = 0, solid = 0, contact = 0, communication = 0, other = 0;
   std::int64_t steps = 0;  ///< fluid steps
 };
 
@@ -60,6 +60,11 @@ struct Momentum {
   std::array<double, 3> to_lower_wall{}, to_upper_wall{};  ///< since the start: fluid + spread + contact
   std::array<double, 3> from_body_force{};                 ///< since the start
   std::array<double, 3> from_loads{};                      ///< since the start
+
+  /// What no step may change.
+  std::array<double, 3> total() const;
+  /// Sum of the magnitudes of all entries but the cells': what an error of the total is compared with.
+  double scale() const;
 };
 
 template <class Real>
@@ -112,7 +117,6 @@ class Simulation {
   void predict();
   void move_cells();
   void impulses();
-  void complete_velocity();
   void add_loads();
   lbm::Vec3 half_body_force() const;
 

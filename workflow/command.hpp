@@ -68,6 +68,7 @@ void add_plan(CLI::App&, Session&);
 void add_run(CLI::App&, Session&);
 void add_status(CLI::App&, Session&);
 void add_resolve(CLI::App&, Session&);
+void add_bench(CLI::App&, Session&);
 void add_calibrate(CLI::App&, Session&);
 void add_coarse(CLI::App&, Session&);
 void add_report(CLI::App&, Session&);

@@ -11,6 +11,8 @@ namespace hemowalk::ibm {
 
 namespace {
 
+constexpr int ahead = 8;  ///< markers between asking for nodes and using them
+
 constexpr int lanes = 16;
 
 /// Node left of coordinate X and the fraction to it; nodes sit at i + 1/2.
@@ -228,6 +230,17 @@ void Markers<Real>::sort(View<const Origin> origin, View<const Node4<Real>> loca
   ++sorts_;
 }
 
+/// Asks for the 16 rows of nodes under a kernel.
+template <int write, class Real>
+HEMO_INLINE void prefetch_rows(const Node4<Real>* base, std::size_t row, std::size_t plane) {
+  for (int c = 0; c < 4; ++c)
+    for (int b = 0; b < 4; ++b) {
+      const auto* p = reinterpret_cast<const char*>(base + c * plane + b * row);
+      __builtin_prefetch(p, write, 3);
+      __builtin_prefetch(p + 4 * sizeof(Node4<Real>) - 1, write, 3);
+    }
+}
+
 template <class Real>
 template <Kernel kernel>
 void Markers<Real>::interpolate_with(View<const Node4<Real>> field, View<Node4<Real>> out) const {
@@ -244,6 +257,8 @@ void Markers<Real>::interpolate_with(View<const Node4<Real>> field, View<Node4<R
     weigh<kernel>(fx, wx), weigh<kernel>(fy, wy), weigh<kernel>(fz, wz);
     for (int l = 0; l < group; ++l) {
       const Node4<Real>* base = field.data + sites_[first + l].base;
+      prefetch_rows<0>(field.data + sites_[std::min<std::ptrdiff_t>(first + l + ahead, active_ - 1)].base,
+                       row, plane);
       Row<Real> sum[2] = {Row<Real>::zero(), Row<Real>::zero()};
       for (int c = 0; c < 4; ++c)
         for (int b = 0; b < 4; ++b)
@@ -279,6 +294,8 @@ void Markers<Real>::spread_with(View<const Node4<Real>> value, View<Node4<Real>>
           v[3] = Real(0);
           const auto share = Row<Real>::join(v * wx.w[0][l], v * wx.w[1][l], v * wx.w[2][l], v * wx.w[3][l]);
           Node4<Real>* base = field.data + sites_[first + l].base;
+          prefetch_rows<1>(field.data + sites_[std::min<std::size_t>(first + l + ahead, active_ - 1)].base,
+                           row, plane);
           for (int c = 0; c < 4; ++c)
             for (int b = 0; b < 4; ++b) {
               auto r = Row<Real>::load(base + c * plane + b * row);

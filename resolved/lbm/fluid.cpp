@@ -278,6 +278,15 @@ void Fluid<Real>::moments_row(int j, int k, bool swapped, View<Node4<Real>> velo
   }
 }
 
+/// velocity += share force on one row, which both are still in cache.
+template <class Real>
+void Fluid<Real>::add_force(int j, int k, View<const Node4<Real>> force, Real share,
+                            View<Node4<Real>> velocity) const {
+  if (share == 0 || force.size == 0) return;
+  const std::size_t row = block_.at(0, j, k);
+  add_share(force.data + row, share, block_.nx, velocity.data + row);
+}
+
 // ---- the sweeps
 
 template <class Real>
@@ -295,20 +304,25 @@ void Fluid<Real>::moments(View<Node4<Real>> velocity) const {
 /// streams.) The first and last plane of a slab wait for the neighbour threads.
 template <class Real>
 template <bool with_moments>
-void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share) {
   const int ny = block_.ny;
+  const auto moments_plane = [&](int k) {
+    for (int j = 0; j < ny; ++j) {
+      moments_row(j, k, !swapped_, velocity);
+      add_force(j, k, force, force_share, velocity);
+    }
+  };
 #pragma omp parallel num_threads(threads())
   {
     const Slab my = slab();
     for (int k = my.begin; k < my.end; ++k) {
       for (int j = 0; j < ny; ++j) collide_row(j, k, force);
-      if (with_moments && k >= my.begin + 2)
-        for (int j = 0; j < ny; ++j) moments_row(j, k - 1, !swapped_, velocity);
+      if (with_moments && k >= my.begin + 2) moments_plane(k - 1);
     }
     if constexpr (with_moments) {
 #pragma omp barrier
       for (int k = my.begin; k < my.end; k += std::max(1, my.end - 1 - my.begin))
-        for (int j = 0; j < ny && !border_plane(k); ++j) moments_row(j, k, !swapped_, velocity);
+        if (!border_plane(k)) moments_plane(k);
     }
   }
   swapped_ = !swapped_;
@@ -318,27 +332,29 @@ void Fluid<Real>::step(View<const Node4<Real>> force, View<Node4<Real>> velocity
 template <class Real>
 void Fluid<Real>::collide_and_stream(View<const Node4<Real>> force) {
   contract(!parameters_.divided_z, "a divided fluid takes its steps by begin_advance and end_advance");
-  step<false>(force, {});
+  step<false>(force, {}, 0);
 }
 
 template <class Real>
-void Fluid<Real>::advance(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
+void Fluid<Real>::advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share) {
   contract(!parameters_.divided_z, "a divided fluid takes its steps by begin_advance and end_advance");
-  step<true>(force, velocity);
+  step<true>(force, velocity, force_share);
 }
 
 template <class Real>
-void Fluid<Real>::begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity) {
-  step<true>(force, velocity);
+void Fluid<Real>::begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share) {
+  step<true>(force, velocity, force_share);
 }
 
 template <class Real>
-void Fluid<Real>::end_advance(View<Node4<Real>> velocity) {
+void Fluid<Real>::end_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share) {
   if (!parameters_.divided_z) return;
 #pragma omp parallel for schedule(static) num_threads(threads())
   for (int j = 0; j < block_.ny; ++j) {
-    moments_row(j, 0, swapped_, velocity);
-    if (block_.nz > 1) moments_row(j, block_.nz - 1, swapped_, velocity);
+    for (int k = 0; k < block_.nz; k += std::max(1, block_.nz - 1)) {
+      moments_row(j, k, swapped_, velocity);
+      add_force(j, k, force, force_share, velocity);
+    }
   }
 }
 

@@ -113,16 +113,17 @@ class Fluid {
   /// only.
   void collide_and_stream(View<const Node4<Real>> force);
 
-  /// collide_and_stream(force), then moments(velocity), in one sweep over memory; same result bit for bit.
-  void advance(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+  /// collide_and_stream(force), then moments(velocity) and velocity += \p force_share force, in one sweep
+  /// over memory: what a coupling reads is u* + theta/2 F (method 5.2, step 2).
+  void advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share = 0);
 
   // A domain divided along z into blocks (divided_z), of one process or many, takes a step in three parts:
-  //     begin_advance(force, velocity);
+  //     begin_advance(force, velocity, force_share);
   //     send_border(side, buffer) -> the neighbour's receive_border(its other side, buffer), both sides
-  //     end_advance(velocity);
+  //     end_advance(force, velocity, force_share);
   // and gives, bit for bit, what the undivided block gives. Five of 19 populations cross a border.
   /// Collides all planes and takes the moments of all but the first and the last.
-  void begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+  void begin_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share = 0);
   /// Numbers of one message.
   std::size_t border_size() const { return 5 * static_cast<std::size_t>(block_.ny) * block_.nx; }
   void send_border(Side side, View<Real> message) const;
@@ -130,7 +131,7 @@ class Fluid {
   /// After load() of a divided block: exchange borders once before moments() and the first step?
   bool border_missing() const { return parameters_.divided_z && swapped_; }
   /// Moments of the first and last plane.
-  void end_advance(View<Node4<Real>> velocity);
+  void end_advance(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share = 0);
 
   WallImpulse wall_impulse() const;
   Totals totals() const;
@@ -171,11 +172,12 @@ class Fluid {
   void collide_node(int i, int j, int k, const Node4<Real>* force, double (&outgoing)[3],
                     double (&to_solid)[3]);
   void moments_row(int j, int k, bool swapped, View<Node4<Real>> velocity) const;
+  void add_force(int j, int k, View<const Node4<Real>> force, Real share, View<Node4<Real>> velocity) const;
   void fill_ghosts(int j, int k);
   void return_ghosts(int j, int k, const RowPointers<Real>& pointers);
   bool border_plane(int k) const { return parameters_.divided_z && (k == 0 || k == block_.nz - 1); }
   template <bool with_moments>
-  void step(View<const Node4<Real>> force, View<Node4<Real>> velocity);
+  void step(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real force_share);
 
   Block block_;
   Parameters parameters_;

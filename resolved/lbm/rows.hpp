@@ -136,6 +136,26 @@ void collide_run(const RowPointers<Real>& row, int begin, int end, const Node4<R
   });
 }
 
+/// velocity += share force on \p nodes nodes: x, y and z; the fourth component of both is left alone.
+template <class Real>
+void add_share(const Node4<Real>* force, Real share, int nodes, Node4<Real>* velocity) {
+  constexpr int W = lanes<Real>, nodes_per_pack = W / 4;
+  int i = 0;
+  if constexpr (nodes_per_pack > 0) {
+    const Pack<Real, W> component([](auto l) { return Real(int(l) % 4); });
+    const auto vector = component < Real(3);
+    for (; i + nodes_per_pack <= nodes; i += nodes_per_pack) {
+      auto u = load<Real, W>(&velocity[i].x);
+      where(vector, u) += share * load<Real, W>(&force[i].x);
+      store<Real, W>(u, &velocity[i].x);
+    }
+  }
+  for (; i < nodes; ++i) {
+    velocity[i].x += share * force[i].x, velocity[i].y += share * force[i].y,
+        velocity[i].z += share * force[i].z;
+  }
+}
+
 /// u* and rho - 1 of nodes begin .. end-1 of a row.
 template <Wall wall, class Real>
 void moments_run(const RowPointers<Real>& row, int begin, int end, Node4<Real>* velocity) {

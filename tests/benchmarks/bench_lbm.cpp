@@ -7,36 +7,14 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
+#include "core/ceilings.hpp"
 #include "resolved/lbm/fluid.hpp"
 
 namespace {
 
 using namespace hemowalk;
-
-double seconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
-
-/// Bytes per second of a[i] = s a[i] + t, counted as one read and one write.
-double bandwidth() {
-  static Array<float> a(80'000'000);
-  std::vector<double> times;
-  for (int r = 0; r < 7; ++r) {
-    const double start = seconds();
-#pragma omp parallel for simd schedule(static)
-    for (std::size_t i = 0; i < a.size(); ++i) a[i] = 0.999f * a[i] + 1.0f;
-    times.push_back(seconds() - start);
-  }
-  return 2.0 * sizeof(float) * static_cast<double>(a.size()) / median(times);
-}
 
 enum class Call { moments, collide, advance };
 
@@ -59,25 +37,25 @@ void fluid_step(benchmark::State& state, Call call) {
       fluid.moments(velocity.view());
     }
   };
-  const double ceiling_before = bandwidth();
+  const double ceiling_before = memory_bandwidth();
   for (int t = 0; t < 4; ++t) step();
   std::vector<double> times;
   for (auto _ : state) {
-    const double start = seconds();
+    const double start = omp_get_wtime();
     step();
-    times.push_back(seconds() - start);
+    times.push_back(omp_get_wtime() - start);
     state.SetIterationTime(times.back());
   }
-  const double ceiling = std::max(ceiling_before, bandwidth());
+  const double ceiling = std::max(ceiling_before, memory_bandwidth());
   const double bytes = call == Call::advance   ? lbm::Fluid<Real>::bytes_per_node_advance()
                        : call == Call::collide ? lbm::Fluid<Real>::bytes_per_node_collide()
                                                : lbm::Fluid<Real>::bytes_per_node_moments();
   const auto nodes = static_cast<double>(block.interior());
-  state.counters["MLUPS"] = 1e-6 * nodes / median(times);
+  state.counters["MLUPS"] = 1e-6 * nodes / middle_of(times);
   state.counters["best"] = 1e-6 * nodes / *std::min_element(times.begin(), times.end());
-  state.counters["GB/s"] = 1e-9 * bytes * nodes / median(times);
+  state.counters["GB/s"] = 1e-9 * bytes * nodes / middle_of(times);
   state.counters["ceiling"] = 1e-9 * ceiling;
-  state.counters["roofline"] = bytes * nodes / median(times) / ceiling;
+  state.counters["roofline"] = bytes * nodes / middle_of(times) / ceiling;
 }
 
 void register_all() {

@@ -34,6 +34,36 @@ Json object_of(const Outcome& outcome, const std::string& verb) {
   return object;
 }
 
+TEST(Json, BenchTellsPartsCeilingsAndMomentum) {
+  const Scratch scratch;
+  const auto bench = object_of(hemowalk(scratch, "bench --scene box20 --steps 3 --json"), "bench");
+  EXPECT_EQ(bench["nodes"], 64000);
+  EXPECT_EQ(bench["markers"], 30 * 258 + 6 * 66);
+  EXPECT_EQ(bench["precision"], "single");
+  double sum = 0;
+  for (const char* part :
+       {"fluid", "interpolation", "spreading", "solid", "contact", "communication", "other"}) {
+    ASSERT_TRUE(bench["parts_ms"].contains(part)) << part;
+    EXPECT_GE(bench["parts_ms"][part], 0) << part;
+    sum += bench["parts_ms"][part].get<double>();
+  }
+  // Medians of parts need not add up to the median of the whole; on three steps of a busy machine within a
+  // factor.
+  EXPECT_GT(sum, 0.2 * bench["step_ms"]["median"].get<double>());
+  EXPECT_LE(bench["step_ms"]["min"], bench["step_ms"]["median"]);
+  EXPECT_GT(bench["ceilings"]["bandwidth_gb_per_s"], 0);
+  EXPECT_GT(bench["ceilings"]["fma_gflop_per_s"], 0);
+  EXPECT_EQ(bench["fluid"]["bytes_per_node"], 200);
+  EXPECT_GT(bench["memory_mb"], 64000 * (19 + 8) * 4e-6);
+  EXPECT_LT(bench["momentum_residual_rel"], 1e-5);
+
+  const auto many = object_of(hemowalk(scratch, "bench --scene box20,box20 --steps 1 --json"), "bench");
+  EXPECT_EQ(many["scenes"].size(), 2U);
+  const auto unknown = hemowalk(scratch, "bench --scene box21 --json");
+  EXPECT_EQ(unknown.code, 2) << unknown.err;
+  EXPECT_NE(unknown.err.find("box20"), std::string::npos);
+}
+
 TEST(Json, EveryVerbPrintsOneObject) {
   const Scratch scratch;
   scratch.write("campaign.yaml", campaign);

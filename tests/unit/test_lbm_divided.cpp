@@ -39,6 +39,7 @@ class Stack {
     for (auto& p : parts_)
       p.fluid->initialise([&](double x, double y, double z) { return flow(x, y, p.first + z); });
   }
+  static constexpr Real share = Real(0.485);  ///< of the force in the velocity
   void exchange() {
     std::vector<std::vector<Real>> up, down;
     for (auto& p : parts_) {
@@ -60,10 +61,10 @@ class Stack {
       for_nodes(p.block, [&](int i, int j, int k) {
         p.force[p.block.at(i, j, k)] = force[whole_.at(i, j, p.first + k)];
       });
-      p.fluid->begin_advance(std::as_const(p.force).view(), p.velocity.view());
+      p.fluid->begin_advance(std::as_const(p.force).view(), p.velocity.view(), share);
     }
     exchange();
-    for (auto& p : parts_) p.fluid->end_advance(p.velocity.view());
+    for (auto& p : parts_) p.fluid->end_advance(std::as_const(p.force).view(), p.velocity.view(), share);
     collect(velocity);
   }
   void collect(Field<Real>& velocity) const {
@@ -145,7 +146,7 @@ TYPED_TEST(Divided, GivesTheWholeBitForBit) {
         Field<Real> u(b.size()), v(b.size());
         for (int t = 0; t < 10; ++t) {
           force.next();
-          whole.advance(force.view(), u.view());
+          whole.advance(force.view(), u.view(), Stack<Real>::share);
           stack.advance(force.field, v);
           ASSERT_TRUE(bitwise_equal(b, u, v)) << planes.size() << " blocks, step " << t << " solid " << solid;
           if (t == 4 || t == 7) stack.restart(p, solid);

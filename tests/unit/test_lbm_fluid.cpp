@@ -179,6 +179,30 @@ TYPED_TEST(FluidOf, AdvanceIsCollideThenMomentsBitForBit) {
     }
 }
 
+TYPED_TEST(FluidOf, AdvanceAddsTheShareOfTheForceThatACouplingReads) {
+  using Real = TypeParam;
+  const Block b{37, 9, 7};
+  const Parameters p = moving_walls(Collision::trt, Forcing::guo, true);
+  Fluid<Real> one(b, p), two(b, p);
+  for (auto* f : {&one, &two}) f->initialise([&](double x, double y, double z) { return wavy(b, x, y, z); });
+  RandomForce<Real> force(b, 1e-3);
+  Field<Real> u(b.size()), v(b.size());
+  const Real share = Real(0.485);
+  for (int t = 0; t < 3; ++t) {
+    force.next();
+    one.advance(force.view(), u.view(), share);
+    two.advance(force.view(), v.view());
+    const double tolerance = 2 * round_off(Real()) * 0.1;  // one product, one sum of numbers below 0.1
+    for_nodes(b, [&](int i, int j, int k) {
+      const std::size_t n = b.at(i, j, k);
+      const Node4<Real>&f = force.field[n], &with = u[n], &without = v[n];
+      ASSERT_NEAR(with.x, without.x + share * f.x, tolerance);
+      ASSERT_NEAR(with.y, without.y + share * f.y, tolerance);
+      ASSERT_NEAR(with.z, without.z + share * f.z, tolerance);
+    });
+  }
+}
+
 TYPED_TEST(FluidOf, FieldsAreWrittenInTheInteriorOnly) {
   using Real = TypeParam;
   const Block b{13, 4, 3};
