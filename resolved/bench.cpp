@@ -134,6 +134,7 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   for (std::size_t p = 0; p < parts.size(); ++p) report.parts.*parts[p] = median(times[p]);
   report.parts.steps = static_cast<std::int64_t>(options.steps) * every;
   report.step.median = median(whole), report.step.min = *std::min_element(whole.begin(), whole.end());
+  for (const double t : whole) report.step.mean += t / static_cast<double>(whole.size());
   for (auto& t : whole) t = std::abs(t - report.step.median);
   report.step.mad = median(whole);
   report.iterations_mean = scene.coupling.iterations;

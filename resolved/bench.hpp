@@ -21,8 +21,8 @@ struct BenchReport {
   int rbc = 0, platelets = 0, threads = 0;
   std::string packing;  ///< how the cells were placed
   struct StepTime {
-    double median = 0, min = 0, mad = 0;
-  } step;                         ///< s per fluid step; mad: median absolute deviation
+    double median = 0, mean = 0, min = 0, mad = 0;
+  } step;  ///< s per fluid step; mean: with the searches for neighbours; mad: median absolute deviation
   Timings parts;                  ///< medians, s per fluid step; steps: how many were timed
   Timings least;                  ///< the shortest time the ceilings allow each part, s; 0 = not estimated
   double bandwidth = 0, fma = 0;  ///< ceilings, bytes/s and flop/s

@@ -19,9 +19,27 @@ constexpr std::size_t width = 16;
 
 }  // namespace
 
+/// A body that left the box and came back on the other side has not moved: lists only know differences, so
+/// its origin stays in the image it had at the search. \p place(from, period) -> the image's origin.
 template <class Real>
-void Neighbours<Real>::update(const Cloud<Real>& cloud) {
-  if (valid_ && holds(cloud)) return;
+template <class Place>
+void Neighbours<Real>::choose_images(Cloud<Real>& cloud, const Place& place) const {
+  const auto bodies = static_cast<std::ptrdiff_t>(cloud.bodies.size());
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t b = 0; b < bodies; ++b)
+    for (int k = 0; k < 3; ++k)
+      if (const double period = domain_.period[k]; period > 0 && period == std::floor(period))
+        cloud.origin[b][k] += static_cast<std::int32_t>(
+            period * place((valid_ ? reference_origin_[b][k] : 0) / period, cloud.origin[b][k] / period));
+}
+
+template <class Real>
+void Neighbours<Real>::update(Cloud<Real>& cloud) {
+  if (valid_) {
+    choose_images(cloud, [](double then, double now) { return std::round(then - now); });
+    if (holds(cloud)) return;
+  }
+  choose_images(cloud, [](double, double now) { return -std::floor(now); });
   search(cloud);
   valid_ = true;
   ++searches_;

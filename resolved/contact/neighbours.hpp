@@ -89,7 +89,8 @@ class Neighbours {
         skin_(law.skin) {}
 
   /// Makes the lists hold for the positions in \p cloud: measures motions and searches again where needed.
-  void update(const Cloud<Real>& cloud);
+  /// Moves origins by whole periods, to the images that the lists know.
+  void update(Cloud<Real>& cloud);
   /// Positions of the last search, exactly. Sums depend on the order of candidates at that time, so a restart
   /// goes on from the same lists. Empty before the first search.
   std::vector<std::byte> save() const;
@@ -157,6 +158,8 @@ class Neighbours {
     std::array<std::vector<float>, 9> corner;  ///< of the hits' triangles, relative to the vertex
   };
 
+  template <class Place>
+  void choose_images(Cloud<Real>& cloud, const Place& place) const;
   bool holds(const Cloud<Real>& cloud);
   void search(const Cloud<Real>& cloud);
   void bound(const Cloud<Real>& cloud, std::size_t body);
