@@ -204,6 +204,11 @@ class Fluid {
   std::vector<std::uint8_t> mixed_;  ///< [nz][ny]: the row has nodes that are not bulk
 };
 
+/// State of a domain from the states of its blocks, in order along z. \throws InputError if they do not fit.
+std::vector<std::byte> join_states(const std::vector<std::vector<std::byte>>& blocks);
+/// State of the block that holds planes [first, first + planes) of a domain.
+std::vector<std::byte> cut_state(View<const std::byte> domain, int first, int planes);
+
 extern template class Fluid<float>;
 extern template class Fluid<double>;
 
