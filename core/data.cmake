@@ -1,5 +1,7 @@
 # hemowalk_data: everything of core/ that needs a library: units, yaml, hdf5, provenance, log and the four nouns.
 find_package(GSL REQUIRED)
+set(MPI_CXX_SKIP_MPICXX ON)
+find_package(MPI REQUIRED COMPONENTS CXX)
 find_package(OpenSSL REQUIRED COMPONENTS Crypto)  # SHA-256; the HDF5 package brings it along
 find_package(nlohmann_json REQUIRED)
 find_package(spdlog REQUIRED)
@@ -19,13 +21,13 @@ add_custom_target(hemowalk_commit
 
 hemowalk_library(hemowalk_data
   SOURCES
-    io.cpp log.cpp progress.cpp provenance.cpp statistics.cpp units.cpp
+    io.cpp log.cpp mpi.cpp progress.cpp provenance.cpp statistics.cpp units.cpp
     data/scene.cpp data/scene_checks.cpp data/scene_format.cpp data/scene_write.cpp data/trajectories.cpp data/transport_law.cpp
     hdf5.cpp
     yaml/canonical.cpp yaml/describe.cpp yaml/document.cpp yaml/overrides.cpp yaml/scalars.cpp yaml/schema.cpp yaml/text.cpp
     yaml/validate.cpp
   LINK
-    hemowalk_core GSL::gsl GSL::gslcblas yaml-cpp nlohmann_json::nlohmann_json spdlog::spdlog fmt::fmt
+    hemowalk_core MPI::MPI_CXX GSL::gsl GSL::gslcblas yaml-cpp nlohmann_json::nlohmann_json spdlog::spdlog fmt::fmt
     PkgConfig::hemowalk_hdf5 OpenSSL::Crypto ${UDUNITS2_LIBRARY})
 # GCC 12 sees an overlap in `"text" + std::string` that is not there (GCC bug 105651).
 target_compile_options(hemowalk_data PRIVATE -Wno-restrict)

@@ -78,10 +78,9 @@ struct Ceilings {
 };
 
 template <class Real>
-Timings least_times(const Simulation<Real>& simulation, const Ceilings& ceilings, double nodes) {
+Timings least_times(const Ceilings& ceilings, double nodes, double markers) {
   Timings least;
   const double real = sizeof(Real);
-  const auto markers = static_cast<double>(simulation.markers());
   least.fluid = ceilings.time(nodes * lbm::Fluid<Real>::bytes_per_node_advance(), 0);
   // Kernels: 64 nodes x 4 components, one multiply-add each; the field passes through memory once, markers
   // bring a position and take a value (spreading also clears the field and fetches what it adds to).
@@ -93,18 +92,24 @@ Timings least_times(const Simulation<Real>& simulation, const Ceilings& ceilings
 template <class Real>
 BenchReport run(const Scene& scene, const BenchOptions& options) {
   const auto say = [&](double fraction, const std::string& what) {
-    if (options.progress) options.progress(fraction, what);
+    if (options.progress && options.ranks.root()) options.progress(fraction, what);
+  };
+  const auto sum = [&](double value) {
+    options.ranks.sum({&value, 1});
+    return value;
   };
   BenchReport report;
-  const Ceilings before{memory_bandwidth(), fma_rate<Real>()};
+  // All ranks measure at the same time: together they have what the machine has.
+  const Ceilings before{sum(memory_bandwidth()), sum(fma_rate<Real>())};
   say(0, "packing");
   std::vector<InitialCell> cells = place_cells(scene, report.packing);
   for (const auto& cell : cells)
     (scene.cells.kinds[cell.kind].name == "platelet" ? report.platelets : report.rbc) += 1;
-  Simulation<Real> simulation(scene, cells);
+  Simulation<Real> simulation(scene, cells, options.ranks);
   cells = {};
-  report.nodes = simulation.block().interior();
-  report.markers = simulation.markers();
+  report.nodes = simulation.decomposition().whole().interior();
+  report.markers = static_cast<std::size_t>(sum(static_cast<double>(simulation.markers())));
+  report.ranks = options.ranks.count();
   report.threads = omp_get_max_threads();
   report.simulated_per_step = simulation.units().to_time(1);
   report.bytes_per_node = lbm::Fluid<Real>::bytes_per_node_advance();
@@ -130,7 +135,7 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   for (int d = 0; d < 3 && end.scale() > 0; ++d)
     report.momentum_residual =
         std::max(report.momentum_residual, std::abs(end.total()[d] - start.total()[d]) / end.scale());
-  report.memory = resident_memory();
+  report.memory = sum(resident_memory());
   for (std::size_t p = 0; p < parts.size(); ++p) report.parts.*parts[p] = median(times[p]);
   report.parts.steps = static_cast<std::int64_t>(options.steps) * every;
   report.step.median = median(whole), report.step.min = *std::min_element(whole.begin(), whole.end());
@@ -139,10 +144,11 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   report.step.mad = median(whole);
   report.iterations_mean = scene.coupling.iterations;
   // The machine may be shared: the better of two measurements is the ceiling.
-  const Ceilings ceilings{std::max(before.bandwidth, memory_bandwidth()),
-                          std::max(before.fma, fma_rate<Real>())};
+  const Ceilings ceilings{std::max(before.bandwidth, sum(memory_bandwidth())),
+                          std::max(before.fma, sum(fma_rate<Real>()))};
   report.bandwidth = ceilings.bandwidth, report.fma = ceilings.fma;
-  report.least = least_times(simulation, ceilings, static_cast<double>(report.nodes));
+  report.least =
+      least_times<Real>(ceilings, static_cast<double>(report.nodes), static_cast<double>(report.markers));
   return report;
 }
 

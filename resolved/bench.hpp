@@ -13,13 +13,14 @@ namespace hemowalk::resolved {
 struct BenchOptions {
   int steps = 50;    ///< timed coupling steps
   int warm_up = 10;  ///< before them
+  mpi::Ranks ranks;  ///< who takes part; all get the report
   std::function<void(double fraction, const std::string& what)> progress;
 };
 
 struct BenchReport {
   std::size_t nodes = 0, markers = 0;
-  int rbc = 0, platelets = 0, threads = 0;
-  std::string packing;  ///< how the cells were placed
+  int rbc = 0, platelets = 0, ranks = 1, threads = 0;  ///< threads: per rank
+  std::string packing;                                 ///< how the cells were placed
   struct StepTime {
     double median = 0, mean = 0, min = 0, mad = 0;
   } step;  ///< s per fluid step; mean: with the searches for neighbours; mad: median absolute deviation

@@ -5,11 +5,15 @@ hemowalk_library(hemowalk_resolved
     bench.cpp
     build.cpp
     checkpoint.cpp
+    copies.cpp
+    decomposition.cpp
     packing.cpp
     preflight.cpp
     recorder.cpp
     resolve.cpp
     simulation.cpp
+    simulation_cells.cpp
+    simulation_state.cpp
     surface_output.cpp
   LINK
     hemowalk_mesh hemowalk_lbm hemowalk_npfem hemowalk_rigid hemowalk_ibm hemowalk_contact hemowalk_data PkgConfig::ZSTD)

@@ -7,9 +7,11 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/retraction.hpp"
 #include "resolved/slip_correction.hpp"
 
 namespace hemowalk::resolved {
@@ -32,208 +34,52 @@ std::array<double, 3>& operator+=(std::array<double, 3>& a, const std::array<dou
   return a;
 }
 
-/// Area vector N = (x1 - x0) x (x2 - x0) of a triangle and its rate, added to the three corners.
-/// [vertex][3][lane]
-template <int lanes, class Real>
-HEMO_INLINE void add_normals(const std::array<int, 3>& t, const Real* x, const Real* v, Real* sum,
-                             Real* rate) {
-  const Real *x0 = x + 3 * t[0] * lanes, *x1 = x + 3 * t[1] * lanes, *x2 = x + 3 * t[2] * lanes;
-  const Real *v0 = v + 3 * t[0] * lanes, *v1 = v + 3 * t[1] * lanes, *v2 = v + 3 * t[2] * lanes;
-  for (int d = 0; d < 3; ++d) {
-    const int p = (d + 1) % 3 * lanes, q = (d + 2) % 3 * lanes;
-    alignas(64) Real N[lanes], dN[lanes];
-#pragma omp simd
-    for (int l = 0; l < lanes; ++l) {
-      const Real ap = x1[p + l] - x0[p + l], aq = x1[q + l] - x0[q + l], bp = x2[p + l] - x0[p + l],
-                 bq = x2[q + l] - x0[q + l];
-      N[l] = ap * bq - aq * bp;
-      dN[l] = (v1[p + l] - v0[p + l]) * bq + ap * (v2[q + l] - v0[q + l]) - (v1[q + l] - v0[q + l]) * bp -
-              aq * (v2[p + l] - v0[p + l]);
-    }
-    for (int i = 0; i < 3; ++i) {
-      Real *s = sum + (3 * t[i] + d) * lanes, *r = rate + (3 * t[i] + d) * lanes;
-#pragma omp simd
-      for (int l = 0; l < lanes; ++l) s[l] += N[l], r[l] += dN[l];
-    }
-  }
+/// Planes a slab needs so that a cell has markers on one neighbour only, and cells of both neighbours cannot
+/// touch: two reaches, the contact's range, and the node by which a centre may be outside on either side.
+double thickest_reach(const data::Scene& scene, const LatticeUnits& units,
+                      const std::vector<InitialCell>& cells) {
+  double radius = 0;
+  std::vector<std::uint8_t> seen(scene.cells.kinds.size(), 0);
+  for (const InitialCell& cell : cells)
+    if (!std::exchange(seen[cell.kind], 1))
+      radius = std::max(radius, mesh::bounding_radius(make_mesh(scene.cells.kinds[cell.kind], units.dx)));
+  return cells.empty() ? 0 : 2 * radius + std::max(0.0, make_contact(scene, units).range) + 2;
 }
 
-/// From the sum S of area vectors round a vertex and its rate: rate <- delta dn/dt, sum <- delta J_t/|S|.
-template <int lanes, class Real>
-HEMO_INLINE void to_unit_normal(Real delta, const Node4<Real>* J, Real* sum, Real* rate) {
-#pragma omp simd
-  for (int l = 0; l < lanes; ++l) {
-    const Real s[3] = {sum[l], sum[lanes + l], sum[2 * lanes + l]},
-               r[3] = {rate[l], rate[lanes + l], rate[2 * lanes + l]};
-    const Real inverse =
-        1 / std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + std::numeric_limits<Real>::min());
-    const Real n[3] = {s[0] * inverse, s[1] * inverse, s[2] * inverse}, j[3] = {J[l].x, J[l].y, J[l].z};
-    const Real nr = n[0] * r[0] + n[1] * r[1] + n[2] * r[2], nj = n[0] * j[0] + n[1] * j[1] + n[2] * j[2];
-    for (int d = 0; d < 3; ++d) {
-      rate[d * lanes + l] = delta * inverse * (r[d] - nr * n[d]);
-      sum[d * lanes + l] = delta * inverse * (j[d] - nj * n[d]);
-    }
-  }
+lbm::Parameters fluid_of(const data::Scene& scene, const LatticeUnits& units, bool divided) {
+  lbm::Parameters p = make_fluid(scene, units);
+  p.divided_z = divided;
+  return p;
 }
 
-/// Forces of the couples on the corners: the gradient of g . N, g the sum over corners, is g x (opposite
-/// edge).
-template <int lanes, class Real>
-HEMO_INLINE void add_couples(const std::array<int, 3>& t, const Real* x, const Real* g, Real* force) {
-  alignas(64) Real sum[3][lanes];
-  for (int d = 0; d < 3; ++d) {
-    const Real *g0 = g + (3 * t[0] + d) * lanes, *g1 = g + (3 * t[1] + d) * lanes,
-               *g2 = g + (3 * t[2] + d) * lanes;
-#pragma omp simd
-    for (int l = 0; l < lanes; ++l) sum[d][l] = g0[l] + g1[l] + g2[l];
-  }
-  for (int i = 0; i < 3; ++i) {
-    const Real *from = x + 3 * t[(i + 1) % 3] * lanes, *to = x + 3 * t[(i + 2) % 3] * lanes;
-    for (int d = 0; d < 3; ++d) {
-      const int p = (d + 1) % 3, q = (d + 2) % 3;
-      Real* f = force + (3 * t[i] + d) * lanes;
-#pragma omp simd
-      for (int l = 0; l < lanes; ++l)
-        f[l] += sum[p][l] * (to[q * lanes + l] - from[q * lanes + l]) -
-                sum[q][l] * (to[p * lanes + l] - from[p * lanes + l]);
-    }
-  }
+ibm::Faces faces_of(const data::Scene& scene, const LatticeUnits& units, bool divided) {
+  ibm::Faces faces = make_faces(scene, units);
+  faces.periodic_z = !divided;
+  return faces;
 }
 
 }  // namespace
 
 template <class Real>
-Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<InitialCell>& cells)
+Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<InitialCell>& cells,
+                             mpi::Ranks ranks)
     : scene_(scene),
       units_(scene),
-      block_(make_block(scene)),
-      faces_(make_faces(scene, units_)),
-      fluid_(block_, make_fluid(scene, units_)),
+      decomposition_(make_block(scene), std::move(ranks), thickest_reach(scene, units_, cells)),
+      block_(decomposition_.block()),
+      faces_(faces_of(scene, units_, decomposition_.divided())),
+      fluid_(block_, fluid_of(scene, units_, decomposition_.divided())),
+      fields_(decomposition_, fluid_.border_size()),
+      any_cells_(!cells.empty()),
       h_(scene.coupling.solid_every),
       one_theta_(scene.coupling.theta_n == scene.coupling.theta_t),
       velocity_(block_.size()),
-      force_(block_.size()) {
+      force_(block_.size()),
+      handing_over_(decomposition_, Topic::cells) {
   build_groups(cells);
+  find_loads(cells);
   build_coupling();
   start_flow();
-}
-
-template <class Real>
-void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
-  const double steps = h_;
-  for (int kind = 0; kind < static_cast<int>(scene_.cells.kinds.size()); ++kind) {
-    if (std::none_of(cells.begin(), cells.end(), [&](const InitialCell& c) { return c.kind == kind; }))
-      continue;
-    const data::Kind& k = scene_.cells.kinds[kind];
-    mesh::TriangleMesh rest = make_mesh(k, units_.dx);
-    const std::vector<double> area = mesh::vertex_areas(rest);
-    const double excess = (k.density / units_.density - 1) * mesh::volume(rest) / rest.vertex_count();
-    std::vector<double> mass(area.size(), excess), weight(area.size()), metric(area.size());
-    for (std::size_t v = 0; v < area.size(); ++v) {
-      weight[v] = scene_.coupling.chi * area[v];
-      metric[v] = mass[v] + steps * weight[v];
-      require(
-          metric[v] > 0,
-          "cells.kinds." + k.name +
-              ".density is too low (the implicit mass of a vertex is not positive) raise it or coupling.chi");
-    }
-    const bool is_rigid = k.law == data::Kind::Law::rigid;
-    auto make = [&]() -> std::variant<npfem::Membranes<Real>, rigid::RigidBodies<Real>> {
-      if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_});
-      return npfem::Membranes<Real>(
-          std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
-    };
-    Group<Real> group{make(), kind,  static_cast<std::int32_t>(bodies_), static_cast<std::uint32_t>(slots_),
-                      mass,   weight};
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      if (cells[c].kind != kind) continue;
-      std::visit(
-          [&](auto& g) {
-            const int index = g.add(static_cast<std::int64_t>(c), cells[c].centre, cells[c].orientation);
-            if constexpr (requires { g.set_positions(index, cells[c].vertices); })
-              if (!cells[c].vertices.empty()) g.set_positions(index, cells[c].vertices);
-          },
-          group.cells);
-    }
-    bodies_ += group.count();
-    std::visit(
-        [&](const auto& g) { slots_ += static_cast<std::size_t>(g.batches()) * g.vertices() * g.lanes; },
-        group.cells);
-    groups_.push_back(std::move(group));
-  }
-}
-
-template <class Real>
-void Simulation<Real>::build_coupling() {
-  std::vector<std::int32_t> body_of(slots_, -1);
-  std::vector<contact::Shape> shapes;
-  std::vector<contact::Body> bodies;
-  for (const auto& group : groups_) {
-    std::visit(
-        [&](const auto& g) {
-          contact::Shape shape;
-          for (const auto& t : g.rest().triangles)
-            for (const int v : t) shape.triangles.push_back(static_cast<std::uint32_t>(v));
-          shape.area = g.vertex_areas();
-          shapes.push_back(std::move(shape));
-          for (int c = 0; c < g.count(); ++c) {
-            for (int k = 0; k < g.vertices(); ++k) body_of[group.marker(c, k)] = group.first_body + c;
-            bodies.push_back({group.marker(c, 0), static_cast<std::uint32_t>(g.lanes),
-                              static_cast<std::uint16_t>(shapes.size() - 1), true});
-          }
-        },
-        group.cells);
-  }
-  markers_ =
-      std::make_unique<ibm::Markers<Real>>(block_, faces_, make_kernel(scene_.coupling.kernel), body_of);
-  const contact::Law law = make_contact(scene_, units_);
-  if (law.stiffness > 0 && bodies_ > 0) {
-    contact_ = std::make_unique<contact::Contact<Real>>(law, make_domain(scene_, block_), shapes);
-    contact_->set_bodies(std::move(bodies));
-  }
-  origin_ = Array<ibm::Origin>(bodies_);
-  vertices_ = Array<Node4<Real>>(slots_), sites_ = Array<Node4<Real>>(slots_);
-  reading_ = Array<Node4<Real>>(slots_), impulse_ = Array<Node4<Real>>(slots_),
-  contact_force_ = Array<Node4<Real>>(slots_);
-  normal_rate_ = Array<Real>(3 * slots_), couple_force_ = Array<Real>(3 * slots_);
-  for (const auto& group : groups_)
-    std::visit(
-        [&](const auto& g) {
-          scratch_stride_ = std::max<std::size_t>(scratch_stride_, 3 * g.vertices() * g.lanes);
-        },
-        group.cells);
-  scratch_ = Array<Real>(scratch_stride_ * omp_get_max_threads());
-  if (!one_theta_) force_reading_ = Array<Node4<Real>>(slots_);
-  add_loads();
-}
-
-/// Point loads act on the given fraction of a cell's vertices, those farthest towards one end of the rest
-/// shape.
-template <class Real>
-void Simulation<Real>::add_loads() {
-  for (const auto& load : scene_.cells.loads)
-    for (const auto& group : groups_)
-      std::visit(
-          [&](const auto& g) {
-            for (int c = 0; c < g.count(); ++c) {
-              if (g.id(c) != load.cell) continue;
-              const int axis = load.end[1] - 'x';
-              const double sign = load.end[0] == '-' ? -1 : 1;
-              const auto x = g.positions(c);
-              std::vector<int> order(x.size());
-              for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<int>(k);
-              std::stable_sort(order.begin(), order.end(),
-                               [&](int a, int b) { return sign * x[a][axis] > sign * x[b][axis]; });
-              const int n =
-                  std::max(1, static_cast<int>(std::lround(load.fraction * static_cast<double>(x.size()))));
-              for (int i = 0; i < n; ++i) {
-                std::array<double, 3> share{};
-                for (int d = 0; d < 3; ++d) share[d] = units_.force(load.force[d]) / n;
-                loads_.push_back({group.marker(c, order[i]), share});
-              }
-            }
-          },
-          group.cells);
 }
 
 template <class Real>
@@ -241,6 +87,7 @@ void Simulation<Real>::start_flow() {
   fluid_.initialise([&](double y) { return steady_velocity(scene_, units_, y); });
   fluid_.moments(velocity_.view());
   ibm::fill_velocity_halo(block_, faces_, velocity_.view());  // no force yet: u* is what markers read
+  fields_.fill(velocity_.view());
 }
 
 template <class Real>
@@ -255,7 +102,8 @@ template <class Real>
 void Simulation<Real>::read_positions() {
   const Real delta = static_cast<Real>(scene_.coupling.retraction);
   const std::array<int, 3> n{block_.nx, block_.ny, block_.nz};
-  const std::array<bool, 3> periodic{faces_.periodic_x, faces_.periodic_y, faces_.periodic_z};
+  const std::array<bool, 2> periodic{faces_.periodic_x, faces_.periodic_y};
+  const bool divided = decomposition_.divided();
   for (auto& group : groups_)
     std::visit(
         [&](const auto& g) {
@@ -273,11 +121,18 @@ void Simulation<Real>::read_positions() {
                 fraction[d][l] = static_cast<Real>(a - whole);
                 if (b * lanes + l >= count) continue;
                 double node = whole;
-                if (periodic[d]) node -= std::floor(node / n[d]) * n[d];
+                if (d == 2) {
+                  node = decomposition_.localise(node);
+                } else if (periodic[d]) {
+                  node -= std::floor(node / n[d]) * n[d];
+                }
                 origin_[group.first_body + b * lanes + l][d] =
                     std::isfinite(node) ? static_cast<std::int32_t>(std::clamp(node, -1e6, 1e6)) : 0;
               }
             const std::size_t slot = group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
+            alignas(64) Real low[lanes], high[lanes];
+            std::fill(low, low + lanes, std::numeric_limits<Real>::max());
+            std::fill(high, high + lanes, std::numeric_limits<Real>::lowest());
             for (int k = 0; k < vertices; ++k) {
               const Real* x = offsets + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
               const Real* normal = normals + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
@@ -289,7 +144,13 @@ void Simulation<Real>::read_positions() {
                 vertex[l] = {px, py, pz, Real(0)};
                 site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
                            pz - delta * normal[2 * lanes + l], Real(0)};
+                low[l] = std::min(low[l], std::min(pz, site[l].z));
+                high[l] = std::max(high[l], std::max(pz, site[l].z));
               }
+            }
+            for (int l = 0; divided && l < std::min(lanes, count - b * lanes); ++l) {
+              const auto body = static_cast<std::size_t>(group.first_body + b * lanes + l);
+              extent_[body] = {origin_[body][2] + double(low[l]), origin_[body][2] + double(high[l])};
             }
           }
         },
@@ -436,37 +297,112 @@ void Simulation<Real>::impulses() {
         group.cells);
 }
 
+/// Positions of the own cells to the neighbours, theirs to here; markers and bodies anew where the lists
+/// changed.
+template <class Real>
+void Simulation<Real>::share_positions() {
+  const auto change =
+      copies_->exchange({extent_.data(), bodies_}, origin_.view(), vertices_.view(), sites_.view());
+  if (change.markers) {
+    fit_arrays();
+    markers_->assign(copies_->body_of());
+  }
+  if (change.bodies && contact_) contact_->set_bodies(copies_->bodies());
+  copies_->place(origin_.view(), vertices_.view(), sites_.view());
+}
+
+/// Readings of a field at all own markers, wherever they lie.
+template <class Real>
+void Simulation<Real>::read_field(View<const Node4<Real>> field, View<Node4<Real>> reading) {
+  markers_->interpolate(field, reading);
+  Stopwatch watch(timings_.communication);
+  copies_->send_readings(reading);
+  copies_->receive_readings(reading);
+}
+
+/// Contact and point loads.
+template <class Real>
+void Simulation<Real>::press() {
+  if (contact_) {
+    contact_summary_ = contact_->compute(origin_.view(), vertices_.view(), contact_force_.view());
+  } else if (!loads_.empty()) {
+    std::memset(static_cast<void*>(contact_force_.data()), 0, contact_force_.size() * sizeof(Node4<Real>));
+  }
+  for (const auto& load : loads_) {
+    if (load.slot < 0) continue;
+    auto& f = contact_force_[load.slot];
+    f.x += static_cast<Real>(load.force[0]), f.y += static_cast<Real>(load.force[1]),
+        f.z += static_cast<Real>(load.force[2]);
+    for (int d = 0; d < 3; ++d) taken_.from_loads[d] += h_ * load.force[d];
+  }
+}
+
+/// Impulses of all markers that lie here, and of what falls into halo and walls.
+template <class Real>
+void Simulation<Real>::spread() {
+  {
+    Stopwatch watch(timings_.spreading);
+#pragma omp parallel for schedule(static)
+    for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(force_.size()); ++i) force_[i] = {0, 0, 0, 0};
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    copies_->receive_impulses(impulse_.view());
+  }
+  {
+    Stopwatch watch(timings_.spreading);
+    markers_->spread(impulse_.view(), force_.view());
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    fields_.fold(force_.view());
+  }
+  Stopwatch watch(timings_.spreading);
+  force_on_walls_ = ibm::fold_force_halo(block_, faces_, force_.view());
+  force_on_walls_[0] += contact_summary_.wall_force[0], force_on_walls_[1] += contact_summary_.wall_force[1];
+  for (int d = 0; d < 3; ++d) {
+    taken_.to_lower_wall[d] += h_ * force_on_walls_[0][d];
+    taken_.to_upper_wall[d] += h_ * force_on_walls_[1][d];
+  }
+}
+
 template <class Real>
 void Simulation<Real>::step() {
-  const double start = omp_get_wtime();
-  const double before =
-      timings_.fluid + timings_.interpolation + timings_.spreading + timings_.solid + timings_.contact;
-  if (bodies_ > 0) {
+  const double start = omp_get_wtime(), before = timings_.accounted();
+  if (any_cells_) {
+    {
+      Stopwatch watch(timings_.communication);
+      hand_over();
+    }
     {
       Stopwatch watch(timings_.interpolation);
       read_positions();
+    }
+    {
+      Stopwatch watch(timings_.communication);
+      share_positions();
+    }
+    {
+      Stopwatch watch(timings_.interpolation);
       markers_->locate(origin_.view(), sites_.view());
       markers_->interpolate(velocity_.view(), reading_.view());
-      if (!one_theta_) {
-        ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, true, {}, {}}, force_.view());
-        markers_->interpolate(force_.view(), force_reading_.view());
-      }
+    }
+    {
+      Stopwatch watch(timings_.communication);
+      copies_->send_readings(reading_.view());
     }
     {
       Stopwatch watch(timings_.contact);
-      if (contact_)
-        contact_summary_ = contact_->compute(origin_.view(), vertices_.view(), contact_force_.view());
-      if (!loads_.empty()) {
-        if (!contact_)
-          std::memset(static_cast<void*>(contact_force_.data()), 0,
-                      contact_force_.size() * sizeof(Node4<Real>));
-        for (const auto& load : loads_) {
-          auto& f = contact_force_[load.slot];
-          f.x += static_cast<Real>(load.force[0]), f.y += static_cast<Real>(load.force[1]),
-              f.z += static_cast<Real>(load.force[2]);
-          for (int d = 0; d < 3; ++d) taken_.from_loads[d] += h_ * load.force[d];
-        }
-      }
+      press();
+    }
+    {
+      Stopwatch watch(timings_.communication);
+      copies_->receive_readings(reading_.view());
+    }
+    if (!one_theta_) {
+      ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, faces_.periodic_z, {}, {}}, force_.view());
+      fields_.fill(force_.view());
+      read_field(force_.view(), force_reading_.view());
     }
     {
       Stopwatch watch(timings_.solid);
@@ -476,41 +412,42 @@ void Simulation<Real>::step() {
       impulses();
     }
     {
-      Stopwatch watch(timings_.spreading);
-#pragma omp parallel for schedule(static)
-      for (std::ptrdiff_t i = 0; i < static_cast<std::ptrdiff_t>(force_.size()); ++i)
-        force_[i] = {0, 0, 0, 0};
-      markers_->spread(impulse_.view(), force_.view());
-      force_on_walls_ = ibm::fold_force_halo(block_, faces_, force_.view());
-      force_on_walls_[0] += contact_summary_.wall_force[0],
-          force_on_walls_[1] += contact_summary_.wall_force[1];
-      for (int d = 0; d < 3; ++d) {
-        taken_.to_lower_wall[d] += h_ * force_on_walls_[0][d];
-        taken_.to_upper_wall[d] += h_ * force_on_walls_[1][d];
-      }
+      Stopwatch watch(timings_.communication);
+      copies_->send_impulses(impulse_.view());
     }
+    spread();
+  }
+  const View<const Node4<Real>> force =
+      any_cells_ ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
+  for (int k = 0; k < scene_.coupling.solid_every; ++k) {
+    const Real share = k + 1 == scene_.coupling.solid_every ? velocity_share() : Real(0);
+    {
+      Stopwatch watch(timings_.fluid);
+      fluid_.begin_advance(force, velocity_.view(), share);
+    }
+    {
+      Stopwatch watch(timings_.communication);
+      fields_.stream(fluid_);
+    }
+    Stopwatch watch(timings_.fluid);
+    fluid_.end_advance(force, velocity_.view(), share);
+    const auto impulse = fluid_.wall_impulse();
+    taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
+    for (int d = 0; d < 3; ++d)
+      taken_.from_body_force[d] +=
+          fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
   }
   {
     Stopwatch watch(timings_.fluid);
-    const View<const Node4<Real>> force =
-        bodies_ > 0 ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
-    // Interpolation reads u* + theta/2 F where one theta serves both directions.
-    const Real share = one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n) : Real(0);
-    for (int k = 0; k < scene_.coupling.solid_every; ++k) {
-      fluid_.advance(force, velocity_.view(), k + 1 == scene_.coupling.solid_every ? share : Real(0));
-      const auto impulse = fluid_.wall_impulse();
-      taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
-      for (int d = 0; d < 3; ++d)
-        taken_.from_body_force[d] +=
-            fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
-    }
     ibm::fill_velocity_halo(block_, faces_, velocity_.view());
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    fields_.fill(velocity_.view());
   }
   fluid_steps_ += scene_.coupling.solid_every;
   timings_.steps += scene_.coupling.solid_every;
-  const double after =
-      timings_.fluid + timings_.interpolation + timings_.spreading + timings_.solid + timings_.contact;
-  timings_.other += omp_get_wtime() - start - (after - before);
+  timings_.other += omp_get_wtime() - start - (timings_.accounted() - before);
 }
 
 std::array<double, 3> Momentum::total() const {
@@ -529,6 +466,7 @@ double Momentum::scale() const {
 
 template <class Real>
 Momentum Simulation<Real>::momentum() const {
+  static_assert(sizeof(Momentum) == 18 * sizeof(double));
   Momentum m = taken_;
   m.fluid = fluid_.totals().momentum;
   for (const auto& group : groups_)
@@ -541,30 +479,40 @@ Momentum Simulation<Real>::momentum() const {
               for (int d = 0; d < 3; ++d) m.cells[d] += group.mass[k] * v[layout.at(c, k, d)];
         },
         group.cells);
+  ranks().sum({m.fluid.data(), 18});
   return m;
 }
 
 template <class Real>
+lbm::Totals Simulation<Real>::totals() const {
+  lbm::Totals t = fluid_.totals();
+  double sums[4] = {t.mass, t.momentum[0], t.momentum[1], t.momentum[2]};
+  ranks().sum({sums, 4});
+  return {sums[0], {sums[1], sums[2], sums[3]}};
+}
+
+template <class Real>
 double Simulation<Real>::slip_rms() {
-  if (bodies_ == 0) return 0;
+  if (!any_cells_) return 0;
   // Of the coupling points against u = u* + F/2 there; velocity_ holds u* + theta/2 F.
-  Array<Node4<Real>> u(slots_), f(slots_);
-  markers_->interpolate(velocity_.view(), u.view());
+  Array<Node4<Real>> u(copies_->slots()), f(copies_->slots());
+  read_field(velocity_.view(), u.view());
   Array<Node4<Real>> field(force_.size());
   std::memcpy(static_cast<void*>(field.data()), force_.data(), force_.size() * sizeof(Node4<Real>));
-  ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, true, {}, {}}, field.view());
-  markers_->interpolate(field.view(), f.view());
+  ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, faces_.periodic_z, {}, {}}, field.view());
+  fields_.fill(field.view());
+  read_field(field.view(), f.view());
   const double rest = 0.5 * (1 - (one_theta_ ? scene_.coupling.theta_n : 0));
   const auto gravity = half_body_force();
-  double sum = 0;
-  std::size_t n = 0;
+  double sums[2] = {0, 0};  // of squares, of markers
   for (const auto& group : groups_)
     std::visit(
         [&](const auto& g) {
           const auto v = g.velocities();
           const auto layout = g.layout();
           for (int c = 0; c < g.count(); ++c)
-            for (int k = 0; k < g.vertices(); ++k, ++n) {
+            for (int k = 0; k < g.vertices(); ++k) {
+              ++sums[1];
               const auto m = group.marker(c, k);
               const double uk[3] = {u[m].x + rest * f[m].x, u[m].y + rest * f[m].y, u[m].z + rest * f[m].z};
               for (int d = 0; d < 3; ++d) {
@@ -572,117 +520,21 @@ double Simulation<Real>::slip_rms() {
                     v[layout.at(c, k, d)] -
                     normal_rate_[3 * static_cast<std::size_t>(group.first_marker) + layout.at(c, k, d)];
                 const double slip = site - uk[d] - gravity[d];
-                sum += slip * slip;
+                sums[0] += slip * slip;
               }
             }
         },
         group.cells);
-  return std::sqrt(sum / static_cast<double>(n));
+  ranks().sum({sums, 2});
+  return std::sqrt(sums[0] / sums[1]);
 }
 
 template <class Real>
 std::size_t Simulation<Real>::memory_bytes() const {
   return fluid_.memory_bytes() +
-         (velocity_.size() + force_.size() + 5 * slots_ + force_reading_.size()) * sizeof(Node4<Real>);
-}
-
-namespace {
-
-template <class T>
-void put(std::vector<std::byte>& out, const T* data, std::size_t n) {
-  const std::uint64_t count = n;
-  const auto* head = reinterpret_cast<const std::byte*>(&count);
-  out.insert(out.end(), head, head + sizeof(count));
-  const auto* raw = reinterpret_cast<const std::byte*>(data);
-  out.insert(out.end(), raw, raw + n * sizeof(T));
-}
-
-class Reader {
- public:
-  explicit Reader(View<const std::byte> in) : in_(in) {}
-  template <class T>
-  std::vector<T> take() {
-    std::uint64_t n = 0;
-    copy(&n, sizeof(n));
-    require(n <= in_.size / sizeof(T),
-            "the checkpoint is damaged (a length runs past its end) start from an older one");
-    std::vector<T> v(n);
-    copy(v.data(), n * sizeof(T));
-    return v;
-  }
-  template <class T>
-  void into(T* data, std::size_t n) {
-    const auto v = take<T>();
-    require(
-        v.size() == n,
-        "the checkpoint does not fit the scene (an array has another length) use the scene it was made with");
-    if (n) std::memcpy(static_cast<void*>(data), v.data(), n * sizeof(T));
-  }
-
- private:
-  void copy(void* to, std::size_t bytes) {
-    require(bytes <= in_.size - at_, "the checkpoint is damaged (it ends too early) start from an older one");
-    if (bytes) std::memcpy(to, in_.data + at_, bytes);
-    at_ += bytes;
-  }
-  View<const std::byte> in_;
-  std::size_t at_ = 0;
-};
-
-}  // namespace
-
-template <class Real>
-std::vector<std::byte> Simulation<Real>::save() const {
-  std::vector<std::byte> out;
-  put(out, &fluid_steps_, 1);
-  put(out, &taken_, 1);
-  const auto fluid = fluid_.save();
-  put(out, fluid.data(), fluid.size());
-  put(out, velocity_.data(), velocity_.size());
-  put(out, force_.data(), force_.size());
-  put(out, impulse_.data(), impulse_.size());
-  const auto sort = markers_->save();
-  put(out, sort.data(), sort.size());
-  const auto contacts = contact_ ? contact_->save() : std::vector<std::byte>{};
-  put(out, contacts.data(), contacts.size());
-  for (const auto& group : groups_)
-    std::visit(
-        [&](const auto& g) {
-          std::vector<std::byte> cells(g.state_bytes() * g.count());
-          for (int c = 0; c < g.count(); ++c) g.save(c, cells.data() + c * g.state_bytes());
-          put(out, cells.data(), cells.size());
-        },
-        group.cells);
-  return out;
-}
-
-template <class Real>
-void Simulation<Real>::load(View<const std::byte> state) {
-  Reader in(state);
-  in.into(&fluid_steps_, 1);
-  in.into(&taken_, 1);
-  const auto fluid = in.take<std::byte>();
-  fluid_.load({fluid.data(), fluid.size()});
-  in.into(velocity_.data(), velocity_.size());
-  in.into(force_.data(), force_.size());
-  in.into(impulse_.data(), impulse_.size());
-  const auto sort = in.take<std::byte>();
-  markers_->load({sort.data(), sort.size()});
-  const auto contacts = in.take<std::byte>();
-  if (contact_) contact_->load({contacts.data(), contacts.size()});
-  for (auto& group : groups_)
-    std::visit(
-        [&](auto& g) {
-          const auto cells = in.take<std::byte>();
-          const int count = g.count();
-          require(cells.size() == g.state_bytes() * count,
-                  "the checkpoint does not fit the scene (another number of cells) use the scene it was made "
-                  "with");
-          // Cells come back in the order they were saved in: lanes, and with them all sums, are the same.
-          for (int c = count - 1; c >= 0; --c) g.remove(c);
-          for (int c = 0; c < count; ++c) g.load(cells.data() + c * g.state_bytes());
-        },
-        group.cells);
+         (velocity_.size() + force_.size() + 5 * vertices_.size() + force_reading_.size()) *
+             sizeof(Node4<Real>) +
+         copies_->memory_bytes();
 }
 
 template class Simulation<float>;

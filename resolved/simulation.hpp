@@ -1,8 +1,12 @@
 #pragma once
 /// \file Simulation: fluid, membranes, rigid bodies, coupling and contact together, in lattice units.
 /// step() is the method, line by line (coupling: conservative). Nothing here knows about files or SI units.
+///
+/// On several ranks each holds a slab of the fluid and the cells with their centre in it (decomposition.hpp,
+/// copies.hpp). Calls marked (all) must then be made by all ranks.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <variant>
@@ -11,7 +15,10 @@
 #include "core/array.hpp"
 #include "core/block.hpp"
 #include "core/data/scene.hpp"
+#include "core/mpi.hpp"
 #include "resolved/contact/contact.hpp"
+#include "resolved/copies.hpp"
+#include "resolved/decomposition.hpp"
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
@@ -28,12 +35,12 @@ struct InitialCell {
   std::vector<mesh::Vec3> vertices;  ///< deformed shape, absolute; empty = rest shape
 };
 
-/// All cells of one kind.
+/// All cells of one kind on this rank.
 template <class Real>
 struct Group {
   std::variant<npfem::Membranes<Real>, rigid::RigidBodies<Real>> cells;
   int kind = 0;                    ///< index into Scene::cells.kinds
-  std::int32_t first_body = 0;     ///< global number of its first cell
+  std::int32_t first_body = 0;     ///< body number of its first cell
   std::uint32_t first_marker = 0;  ///< of vertex k of cell c: first_marker + layout().at(c, k)
   std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid
   std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx
@@ -47,10 +54,14 @@ struct Group {
   }
 };
 
-/// Where the time of a step goes, seconds since the last reset.
+/// Where the time of a step goes on this rank, seconds since the last reset.
 struct Timings {
-  double fluid = 0, interpolation = 0, spreading = 0, solid = 0, contact = 0, communication = 0, other = 0;
+  double fluid = 0, interpolation = 0, spreading = 0, solid = 0, contact = 0;
+  double communication = 0;  ///< packing, sending and waiting for other ranks; 0 on one rank
+  double other = 0;
   std::int64_t steps = 0;  ///< fluid steps
+
+  double accounted() const { return fluid + interpolation + spreading + solid + contact + communication; }
 };
 
 /// Sums over the whole system for the momentum budget: what the fluid and the cells hold, what walls have
@@ -70,70 +81,102 @@ struct Momentum {
 template <class Real>
 class Simulation {
  public:
-  /// Lattice, cells and steady initial flow. \throws InputError when the scene cannot be simulated.
-  Simulation(const data::Scene& scene, const std::vector<InitialCell>& cells);
+  /// Lattice, cells and steady initial flow. \p cells: all of them, on every rank; their place in the list is
+  /// their id. \throws InputError when the scene cannot be simulated, or not on so many ranks (all).
+  Simulation(const data::Scene& scene, const std::vector<InitialCell>& cells, mpi::Ranks ranks = {});
 
-  /// One coupling step: `solid_every` fluid steps and one solid step. \throws PhysicsError naming cell and
-  /// step.
+  /// One coupling step: `solid_every` fluid steps and one solid step (all). \throws PhysicsError naming cell
+  /// and step.
   void step();
 
   const data::Scene& scene() const { return scene_; }
   const LatticeUnits& units() const { return units_; }
+  const mpi::Ranks& ranks() const { return decomposition_.ranks(); }
+  const Decomposition& decomposition() const { return decomposition_; }
+  /// This rank's slab; the domain is decomposition().whole().
   const Block& block() const { return block_; }
   const lbm::Fluid<Real>& fluid() const { return fluid_; }
+  /// One group per kind that occurs, on every rank; its cells are those of this rank.
   const std::vector<Group<Real>>& groups() const { return groups_; }
   std::vector<Group<Real>>& groups() { return groups_; }
+  /// Cells on this rank.
   int bodies() const { return static_cast<int>(bodies_); }
   std::int64_t fluid_steps() const { return fluid_steps_; }
   /// Physical time, s.
   double time() const { return units_.to_time(static_cast<double>(fluid_steps_)); }
 
-  /// Force density of the last step (momentum per node and fluid step), interior.
+  /// Force density of the last step (momentum per node and fluid step), interior of this rank's slab.
   View<const Node4<Real>> force() const { return force_.view(); }
   /// What interpolation reads: u* + theta/2 F_prev with halo.
   View<const Node4<Real>> velocity() const { return velocity_.view(); }
+  /// Of this rank's cells.
   const contact::Summary& contact_summary() const { return contact_summary_; }
-  /// Force of the cells on the lower and the upper wall in the last step, through kernels and by contact.
+  /// Force of the cells on this rank's part of the lower and the upper wall in the last step, through kernels
+  /// and by contact.
   const std::array<std::array<double, 3>, 2>& force_on_walls() const { return force_on_walls_; }
+  /// Of the whole system (all).
   Momentum momentum() const;
-  /// Root mean square over membrane markers of |v - I[u]|, u = u* + F/2 after the step; costs an
-  /// interpolation.
+  /// Of the whole fluid (all).
+  lbm::Totals totals() const;
+  /// Root mean square over all membrane markers of |v - I[u]|, u = u* + F/2 after the step; costs an
+  /// interpolation (all).
   double slip_rms();
   const mesh::StepReport& solid_report() const { return solid_report_; }
   Timings& timings() { return timings_; }
   std::size_t memory_bytes() const;
+  /// Markers that this rank interpolates and spreads.
   std::size_t markers() const { return markers_->active(); }
+  /// Cells that came to this rank from another since the start.
+  std::int64_t arrivals() const { return arrivals_; }
 
-  /// Complete state, exact: a restart on the same block continues bit for bit.
+  /// This rank's part of the state, exact: a restart on as many ranks continues bit for bit.
   std::vector<std::byte> save() const;
+  /// Takes back a part saved by the same rank of as many, or made by redistribute() (all).
   void load(View<const std::byte> state);
 
  private:
   void build_groups(const std::vector<InitialCell>& cells);
+  void find_loads(const std::vector<InitialCell>& cells);
   void build_coupling();
+  void arrange();
+  void fit_arrays();
   void start_flow();
   void read_positions();
+  void share_positions();
+  void read_field(View<const Node4<Real>> field, View<Node4<Real>> reading);
+  void press();
   void retract();
   void predict();
   void move_cells();
   void impulses();
-  void add_loads();
+  void spread();
+  void hand_over();
+  /// Interpolation reads u* + this share of F where one theta serves both directions.
+  Real velocity_share() const {
+    return one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n) : Real(0);
+  }
   lbm::Vec3 half_body_force() const;
 
   data::Scene scene_;
   LatticeUnits units_;
+  Decomposition decomposition_;
   Block block_;
   ibm::Faces faces_;
   lbm::Fluid<Real> fluid_;
+  FieldExchange<Real> fields_;
   std::vector<Group<Real>> groups_;
+  bool any_cells_ = false;  ///< on any rank
   std::size_t bodies_ = 0, slots_ = 0;
   double h_ = 1;           ///< solid time step in fluid steps
   bool one_theta_ = true;  ///< theta_n == theta_t: one field carries velocity and correction
 
   std::unique_ptr<ibm::Markers<Real>> markers_;
   std::unique_ptr<contact::Contact<Real>> contact_;
-  Array<Node4<Real>> velocity_, force_;         ///< fields with halo
+  std::unique_ptr<Copies<Real>> copies_;
+  Array<Node4<Real>> velocity_, force_;  ///< fields with halo
+  // Arrays of bodies and slots hold this rank's own, then the neighbours' copies; they never shrink.
   Array<ibm::Origin> origin_;                   ///< [body]
+  Array<Extent> extent_;                        ///< [own body], on several ranks
   Array<Node4<Real>> vertices_, sites_;         ///< [slot] relative to origin: membrane, retracted
   Array<Node4<Real>> reading_, force_reading_;  ///< [slot] I[.]; after predict(): w
   Array<Node4<Real>> impulse_, contact_force_;  ///< [slot]
@@ -141,18 +184,28 @@ class Simulation {
   Array<Real> scratch_;                     ///< [thread][scratch_stride_]
   std::size_t scratch_stride_ = 0;
   struct PointLoad {
-    std::uint32_t slot;
+    std::int64_t cell;
+    int vertex;
     std::array<double, 3> force;
+    std::int64_t slot = -1;  ///< negative: the cell is on another rank
   };
   std::vector<PointLoad> loads_;
+  Ring handing_over_;
+  std::int64_t arrivals_ = 0;
 
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;
   std::int64_t fluid_steps_ = 0;
-  Momentum taken_;  ///< accumulated parts of the budget
+  Momentum taken_;  ///< accumulated parts of the budget, of this rank
   Timings timings_;
 };
+
+/// The state that \p parts (one per rank, in order) saved, cut for \p ranks ranks instead. Sums then differ
+/// in their round-off. \throws InputError when a part is damaged.
+template <class Real>
+std::vector<std::vector<std::byte>> redistribute(const std::vector<std::vector<std::byte>>& parts,
+                                                 const Block& whole, int ranks);
 
 extern template class Simulation<float>;
 extern template class Simulation<double>;

@@ -31,7 +31,7 @@ void fill_velocity_halo(const Block& b, const Faces& faces, View<Node4<Real>> u)
         u[b.at(i, b.ny + a, k)] = faces.periodic_y ? u[b.at(i, a, k)] : upper;
       }
   }
-  for (int a = 0; a < h; ++a)
+  for (int a = 0; a < h && faces.periodic_z; ++a)
 #pragma omp parallel for schedule(static)
     for (int j = -h; j < b.ny + h; ++j)
       for (int i = -h; i < b.nx + h; ++i) {
@@ -44,7 +44,7 @@ template <class Real>
 std::array<std::array<double, 3>, 2> fold_force_halo(const Block& b, const Faces& faces,
                                                      View<Node4<Real>> f) {
   constexpr int h = Block::halo;
-  for (int a = 0; a < h; ++a)
+  for (int a = 0; a < h && faces.periodic_z; ++a)
 #pragma omp parallel for schedule(static)
     for (int j = -h; j < b.ny + h; ++j)
       for (int i = -h; i < b.nx + h; ++i) {

@@ -110,20 +110,27 @@ Markers<Real>::Markers(const Block& block, const Faces& faces, Kernel kernel,
     : block_(block),
       faces_(faces),
       kernel_(kernel),
-      count_(body_of.size()),
-      body_(body_of),
       slabs_((block.nz + slab_planes - 1) / slab_planes),
-      strips_((block.ny + 2 + strip_rows - 1) / strip_rows),
-      home_(count_),
-      tile_(count_) {
+      strips_((block.ny + 2 + strip_rows - 1) / strip_rows) {
   require(block.size() < (std::size_t(1) << 32),
           "the block has more than 2^32 nodes (base nodes are 32-bit) split it over more ranks");
-  for (const auto b : body_) active_ += b >= 0;
-  sites_ = Array<Site>(active_ + lanes);
-  marker_ = Array<std::uint32_t>(active_);
-  slot_ = Array<std::uint32_t>(count_);
   counts_.resize(static_cast<std::size_t>(slabs_) * strips_ * sort_chunks + 1);
   slab_begin_.resize(slabs_ + 1);
+  assign(body_of);
+}
+
+template <class Real>
+void Markers<Real>::assign(const std::vector<std::int32_t>& body_of) {
+  body_.assign(body_of.begin(), body_of.end());
+  count_ = body_.size(), active_ = 0;
+  for (const auto b : body_) active_ += b >= 0;
+  // The first size fits exactly; a set that changes gets room for the next changes.
+  const auto fit = [](auto& array, std::size_t n) {
+    if (n > array.size()) array = std::remove_reference_t<decltype(array)>(array.size() == 0 ? n : n + n / 4);
+  };
+  fit(sites_, active_ + lanes), fit(marker_, active_);
+  fit(slot_, count_), fit(home_, count_), fit(tile_, count_);
+  sorted_ = false;
 }
 
 template <class Real>
@@ -188,7 +195,7 @@ void Markers<Real>::sort(View<const Origin> origin, View<const Node4<Real>> loca
           wraps = node[d] >= 0 ? node[d] / n[d] : -((n[d] - 1 - node[d]) / n[d]);
           good = good && std::abs(wraps) < 127;
         } else {
-          good = good && node[d] >= -1 && node[d] < n[d];
+          good = good && node[d] >= -1 && node[d] < n[d] + (d == 2);
         }
         node[d] -= wraps * n[d];
         home_[m].wraps[d] = static_cast<std::int8_t>(wraps);
@@ -338,9 +345,9 @@ std::vector<std::byte> Markers<Real>::save() const {
     const auto* raw = static_cast<const std::byte*>(data);
     out.insert(out.end(), raw, raw + bytes);
   };
-  put(marker_.data(), marker_.size() * sizeof(std::uint32_t));
-  put(slot_.data(), slot_.size() * sizeof(std::uint32_t));
-  put(home_.data(), home_.size() * sizeof(Home));
+  put(marker_.data(), active_ * sizeof(std::uint32_t));
+  put(slot_.data(), count_ * sizeof(std::uint32_t));
+  put(home_.data(), count_ * sizeof(Home));
   put(slab_begin_.data(), slab_begin_.size() * sizeof(std::uint32_t));
   return out;
 }
@@ -349,8 +356,8 @@ template <class Real>
 void Markers<Real>::load(View<const std::byte> state) {
   sorted_ = state.size > 0;
   if (!sorted_) return;
-  const std::size_t bytes = (marker_.size() + slot_.size() + slab_begin_.size()) * sizeof(std::uint32_t) +
-                            home_.size() * sizeof(Home);
+  const std::size_t bytes =
+      (active_ + count_ + slab_begin_.size()) * sizeof(std::uint32_t) + count_ * sizeof(Home);
   require(state.size == bytes,
           "the saved marker order does not fit (another number of markers or another block) use the scene it "
           "was made with");
@@ -359,9 +366,9 @@ void Markers<Real>::load(View<const std::byte> state) {
     if (n) std::memcpy(data, at, n);
     at += n;
   };
-  take(marker_.data(), marker_.size() * sizeof(std::uint32_t));
-  take(slot_.data(), slot_.size() * sizeof(std::uint32_t));
-  take(home_.data(), home_.size() * sizeof(Home));
+  take(marker_.data(), active_ * sizeof(std::uint32_t));
+  take(slot_.data(), count_ * sizeof(std::uint32_t));
+  take(home_.data(), count_ * sizeof(Home));
   take(slab_begin_.data(), slab_begin_.size() * sizeof(std::uint32_t));
 }
 

@@ -29,9 +29,13 @@ class Markers {
   /// \p body_of: the body of each marker, or a negative number for an unused slot (idle SIMD lane).
   Markers(const Block& block, const Faces& faces, Kernel kernel, const std::vector<std::int32_t>& body_of);
 
+  /// Another set of markers from now on, numbered as \p body_of; the next locate() sorts. Memory only grows.
+  void assign(const std::vector<std::int32_t>& body_of);
+
   /// Takes the positions origin[body] + local[marker] (lattice units from the block's corner), finds base
   /// nodes and fractions, and sorts again if a marker left the neighbourhood of its tile. Cost: one pass over
-  /// the markers. \throws PhysicsError naming the marker when one is not finite or lies outside the walls.
+  /// the markers. \throws PhysicsError naming the marker when one is not finite, lies outside the walls or
+  /// more than one node outside a block that is not periodic along z.
   void locate(View<const Origin> origin, View<const Node4<Real>> local);
 
   /// out[m] = sum over nodes of phi(x - X_m) field(x), all four components.

@@ -290,12 +290,15 @@ void Fluid<Real>::add_force(int j, int k, View<const Node4<Real>> force, Real sh
 // ---- the sweeps
 
 template <class Real>
-void Fluid<Real>::moments(View<Node4<Real>> velocity) const {
+void Fluid<Real>::moments(View<Node4<Real>> velocity, View<const Node4<Real>> force, Real force_share) const {
 #pragma omp parallel num_threads(threads())
   {
     const Slab my = slab();
     for (int k = my.begin; k < my.end; ++k)
-      for (int j = 0; j < block_.ny; ++j) moments_row(j, k, swapped_, velocity);
+      for (int j = 0; j < block_.ny; ++j) {
+        moments_row(j, k, swapped_, velocity);
+        add_force(j, k, force, force_share, velocity);
+      }
   }
 }
 

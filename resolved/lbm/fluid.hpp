@@ -106,7 +106,8 @@ class Fluid {
 
   /// Velocity WITHOUT force, u* = sum c_i f_i / rho (method 5.2, step 1), into the interior of a halo field
   /// (length block().size()); w = rho - 1. Solid nodes get zeros. 76 + 16 bytes per node (float).
-  void moments(View<Node4<Real>> velocity) const;
+  /// With \p force its share is added, as in advance().
+  void moments(View<Node4<Real>> velocity, View<const Node4<Real>> force = {}, Real force_share = 0) const;
 
   /// One step: collision with \p force (halo field, interior read; momentum per node and step; w ignored)
   /// plus the body force, then streaming. Each node gains exactly its force. An empty view means body force
@@ -205,6 +206,11 @@ class Fluid {
   std::vector<std::uint8_t> kind_;                                  ///< interior nodes
   std::vector<std::uint8_t> mixed_;  ///< [nz][ny]: the row has nodes that are not bulk
 };
+
+/// State of a domain from the states of its blocks, in order along z. \throws InputError if they do not fit.
+std::vector<std::byte> join_states(const std::vector<std::vector<std::byte>>& blocks);
+/// State of the block that holds planes [first, first + planes) of a domain.
+std::vector<std::byte> cut_state(View<const std::byte> domain, int first, int planes);
 
 extern template class Fluid<float>;
 extern template class Fluid<double>;

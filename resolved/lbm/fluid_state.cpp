@@ -226,6 +226,46 @@ void Fluid<Real>::load(View<const std::byte> state) {
     }
 }
 
+std::vector<std::byte> join_states(const std::vector<std::vector<std::byte>>& blocks) {
+  std::vector<std::byte> whole(sizeof(StateHeader));
+  StateHeader sum;
+  for (const auto& block : blocks) {
+    StateHeader header;
+    require(block.size() >= sizeof header,
+            "fluid state cut short (no room for its header) use an intact checkpoint");
+    std::memcpy(&header, block.data(), sizeof header);
+    if (sum.nz == 0) {
+      sum = header;
+    } else {
+      require(header.magic == sum.magic && header.real_size == sum.real_size &&
+                  header.swapped == sum.swapped && header.nx == sum.nx && header.ny == sum.ny &&
+                  header.steps == sum.steps,
+              "fluid states do not fit together (other sizes or other steps) use an intact checkpoint");
+      sum.nz += header.nz;
+    }
+    whole.insert(whole.end(), block.begin() + sizeof header, block.end());
+  }
+  std::memcpy(whole.data(), &sum, sizeof sum);
+  return whole;
+}
+
+std::vector<std::byte> cut_state(View<const std::byte> domain, int first, int planes) {
+  StateHeader header;
+  require(domain.size >= sizeof header,
+          "fluid state cut short (no room for its header) use an intact checkpoint");
+  std::memcpy(&header, domain.data, sizeof header);
+  const std::size_t plane = static_cast<std::size_t>(header.nx) * header.ny * directions * header.real_size;
+  require(
+      first >= 0 && planes > 0 && first + planes <= header.nz &&
+          domain.size == sizeof header + header.nz * plane,
+      "fluid state does not hold the planes asked of it (another box) resume with the scene that wrote it");
+  header.nz = planes;
+  std::vector<std::byte> block(sizeof header + planes * plane);
+  std::memcpy(block.data(), &header, sizeof header);
+  std::memcpy(block.data() + sizeof header, domain.data + sizeof header + first * plane, planes * plane);
+  return block;
+}
+
 template <class Real>
 std::size_t Fluid<Real>::memory_bytes() const {
   return f_.size() * sizeof(Real) + rows_.size() * sizeof(rows_[0]) + solid_.size() + kind_.size() +

@@ -73,7 +73,7 @@ nlohmann::ordered_json to_json(const std::string& name, const data::Scene& scene
   nlohmann::ordered_json o;
   o["scene"] = name;
   o["nodes"] = r.nodes, o["markers"] = r.markers, o["cells"] = {{"rbc", r.rbc}, {"platelet", r.platelets}};
-  o["threads"] = r.threads, o["ranks"] = 1;
+  o["threads"] = r.threads, o["ranks"] = r.ranks;
   o["precision"] = scene.fluid.precision == data::Fluid::Precision::double_ ? "double" : "single";
   o["acceleration"] = scene.acceleration;
   o["packing"] = r.packing;
@@ -104,8 +104,10 @@ nlohmann::ordered_json to_json(const std::string& name, const data::Scene& scene
 }
 
 void print(const std::string& name, const data::Scene& scene, const BenchReport& r) {
-  fmt::print("{}: {} nodes, {} markers, {} red cells, {} platelets ({}); {} threads, acceleration {:g}\n",
-             name, r.nodes, r.markers, r.rbc, r.platelets, r.packing, r.threads, scene.acceleration);
+  fmt::print(
+      "{}: {} nodes, {} markers, {} red cells, {} platelets ({}); {} ranks of {} threads, acceleration "
+      "{:g}\n",
+      name, r.nodes, r.markers, r.rbc, r.platelets, r.packing, r.ranks, r.threads, scene.acceleration);
   fmt::print("ceilings of this run: {:.1f} GB/s, {:.0f} Gflop/s\n\n{:<26}{:>10}{:>9}{:>22}\n",
              1e-9 * r.bandwidth, 1e-9 * r.fma, "part", "ms/step", "share", "fraction of ceiling");
   for (const auto& row : rows) {
@@ -145,18 +147,20 @@ int bench(const Flags& flags, const std::string& names, int steps) {
   }
   std::vector<std::pair<std::string, BenchReport>> reports;
   auto all = nlohmann::ordered_json::array();
+  const bool speaks = mpi::Ranks::world().root();
   for (const auto& [name, scene] : asked) {
     Progress progress(name);
     resolved::BenchOptions options;
     options.steps = steps;
     options.warm_up = std::min(steps, 10);
+    options.ranks = mpi::Ranks::world();
     options.progress = [&](double fraction, const std::string& what) { progress.update(fraction, what); };
     reports.emplace_back(name, resolved::bench(scene, options));
     all.push_back(to_json(name, scene, reports.back().second));
-    if (!flags.json) print(name, scene, reports.back().second);
+    if (!flags.json && speaks) print(name, scene, reports.back().second);
   }
-  if (!flags.json && reports.size() > 1) print_scaling(reports);
-  if (!flags.json) return 0;
+  if (!flags.json && speaks && reports.size() > 1) print_scaling(reports);
+  if (!flags.json || !speaks) return 0;
   auto object = json_head("bench", asked.front().second.input_sha256, asked.front().second.seed);
   if (all.size() == 1) {
     object.update(all.front());
