@@ -1,5 +1,6 @@
 #include "resolved/build.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/check.hpp"
@@ -23,7 +24,7 @@ Block make_block(const data::Scene& scene) {
 
 ibm::Faces make_faces(const data::Scene& scene, const LatticeUnits& units) {
   ibm::Faces faces;
-  faces.periodic_y = scene.domain.geometry == data::Domain::Geometry::periodic;
+  faces.periodic_y = scene.domain.geometry != data::Domain::Geometry::slab;  // else solid nodes are the walls
   if (scene.flow.type == data::Flow::Type::couette) {
     const double speed = units.velocity(scene.flow.shear_rate * scene.domain.size[1]);
     const bool both = scene.flow.walls == data::Flow::Walls::both;
@@ -46,12 +47,14 @@ ibm::Kernel make_kernel(data::Coupling::Kernel kernel) {
 
 namespace {
 
-/// Pressure gradient that drives a poiseuille flow, N/m3: given, or 12 mu U/H^2 for a mean velocity U in a
-/// slab.
+/// Pressure gradient that drives a poiseuille flow, N/m3: given, or for a mean velocity U 12 mu U/H^2 in a
+/// slab, 32 mu U/D^2 in a tube.
 double driving_force(const data::Scene& scene) {
   if (scene.flow.type != data::Flow::Type::poiseuille) return 0;
   if (scene.flow.pressure_gradient) return *scene.flow.pressure_gradient;
   const double mu = scene.fluid.density * scene.fluid.kinematic_viscosity, H = scene.domain.size[1];
+  if (scene.domain.geometry == data::Domain::Geometry::tube)
+    return 32 * mu * scene.flow.mean_velocity.value_or(0) / std::pow(scene.domain.tube_diameter, 2);
   return 12 * mu * scene.flow.mean_velocity.value_or(0) / (H * H);
 }
 
@@ -71,11 +74,16 @@ lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units) 
   return p;
 }
 
-double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double y) {
+double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double x, double y) {
   const double H = units.length(scene.domain.size[1]);
+  const double nu = (scene.fluid.tau - 0.5) / 3, g = units.force_density(driving_force(scene));
+  if (scene.domain.geometry == data::Domain::Geometry::tube) {
+    const double rx = x - units.length(scene.domain.size[0]) / 2, ry = y - H / 2,
+                 radius = units.length(scene.domain.tube_diameter) / 2;
+    return std::max(0.0, g / (4 * nu) * (radius * radius - rx * rx - ry * ry));
+  }
   const ibm::Faces faces = make_faces(scene, units);
   if (faces.periodic_y) return 0;
-  const double nu = (scene.fluid.tau - 0.5) / 3, g = units.force_density(driving_force(scene));
   return faces.lower_wall[2] + (faces.upper_wall[2] - faces.lower_wall[2]) * y / H +
          g / (2 * nu) * y * (H - y);
 }
@@ -147,11 +155,18 @@ contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units) {
 
 contact::Domain make_domain(const data::Scene& scene, const Block& block) {
   contact::Domain domain;
-  const bool walls = scene.domain.geometry != data::Domain::Geometry::periodic;
-  domain.period = {static_cast<double>(block.nx), walls ? 0.0 : block.ny, static_cast<double>(block.nz)};
-  if (walls) {
+  using Geometry = data::Domain::Geometry;
+  domain.period = {static_cast<double>(block.nx), static_cast<double>(block.ny),
+                   static_cast<double>(block.nz)};
+  if (scene.domain.geometry == Geometry::slab) {
     domain.walls.geometry = contact::Walls::Geometry::slab;
     domain.walls.lower = 0, domain.walls.upper = block.ny;
+    domain.period[1] = 0;
+  } else if (scene.domain.geometry == Geometry::tube) {
+    domain.walls.geometry = contact::Walls::Geometry::tube;
+    domain.walls.x = block.nx / 2.0, domain.walls.y = block.ny / 2.0;
+    domain.walls.radius = scene.domain.tube_diameter / scene.fluid.dx / 2;
+    domain.period[0] = domain.period[1] = 0;
   }
   return domain;
 }

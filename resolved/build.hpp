@@ -19,8 +19,9 @@ Block make_block(const data::Scene& scene);
 ibm::Faces make_faces(const data::Scene& scene, const LatticeUnits& units);
 ibm::Kernel make_kernel(data::Coupling::Kernel kernel);
 lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units);
-/// Steady velocity along z at height y (lattice units), without cells.
-double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double y);
+/// Steady velocity along z at (x, y) (lattice units), without cells; 0 where it is not known (a surface from
+/// a file).
+double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double x, double y);
 /// Rest shape centred at the origin, in units of \p unit metres.
 mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);

@@ -11,6 +11,7 @@
 #include "core/random.hpp"
 #include "resolved/build.hpp"
 #include "resolved/contact/grid.hpp"
+#include "resolved/region.hpp"
 #include "resolved/resolve.hpp"
 
 namespace hemowalk::resolved {
@@ -62,9 +63,8 @@ Census census(const data::Scene& scene) {
           "cells.hematocrit needs red cells (cells.kinds has none) describe a kind rbc");
   require(kinds.platelet >= 0 || scene.cells.platelets_per_rbc == 0,
           "cells.platelets_per_rbc needs platelets (cells.kinds has none) describe a kind platelet");
-  const data::Vec3& size = scene.domain.size;
   if (kinds.red >= 0)
-    result.rbc = count_of(*scene.cells.hematocrit * size[0] * size[1] * size[2] / result.rbc_volume);
+    result.rbc = count_of(*scene.cells.hematocrit * Region(scene).volume() / result.rbc_volume);
   if (kinds.platelet >= 0) result.platelets = count_of(result.rbc * scene.cells.platelets_per_rbc);
   return result;
 }
@@ -171,7 +171,8 @@ void Packing::add_groups() {
 contact::Domain Packing::domain(double scale) const {
   contact::Domain d = make_domain(scene_, block_);
   for (double& p : d.period) p /= scale;
-  d.walls.lower /= scale, d.walls.upper /= scale;
+  for (double* length : {&d.walls.lower, &d.walls.upper, &d.walls.x, &d.walls.y, &d.walls.radius})
+    *length /= scale;
   return d;
 }
 
@@ -247,7 +248,7 @@ void Packing::scatter() {
       spheres += b.cells * 4.18879 * std::pow(radius_of(b.kind), 3);
       largest = std::max(largest, radius_of(b.kind));
     }
-  const double room = static_cast<double>(block_.interior());
+  const double room = units_.volume(Region(scene_).volume());
   double needed = 0;  // with half the smallest gap around every cell
   for (const Batch& b : batches)
     if (b.cells > 0) {
@@ -263,9 +264,19 @@ void Packing::scatter() {
   scale_ = std::min(start_scale, std::cbrt(start_fraction * room / std::max(spheres, 1e-9)));
   const contact::Domain box = domain(scale_);
   const Vec3 size{block_.nx / scale_, block_.ny / scale_, block_.nz / scale_};
-  const bool walls = box.walls.geometry != contact::Walls::Geometry::none;
-  require(!walls || size[1] > 2 * largest,
+  using Geometry = contact::Walls::Geometry;
+  require((box.walls.geometry != Geometry::slab || size[1] > 2 * largest) &&
+              (box.walls.geometry != Geometry::tube || box.walls.radius > largest),
           "cells do not fit between the walls (bounding sphere against gap) enlarge the box");
+  // A uniform point of the box, or of the room that walls leave to a sphere's centre.
+  const auto point = [&](const auto& u, const auto& w, double radius) -> Vec3 {
+    if (box.walls.geometry == Geometry::tube) {
+      const double r = (box.walls.radius - radius) * std::sqrt(u[0]), angle = 2 * std::acos(-1.0) * u[1];
+      return {box.walls.x + r * std::cos(angle), box.walls.y + r * std::sin(angle), w[0] * size[2]};
+    }
+    const double margin = box.walls.geometry == Geometry::slab ? radius : 0;
+    return {u[0] * size[0], margin + u[1] * (size[1] - 2 * margin), w[0] * size[2]};
+  };
 
   // Cells of a grid as wide as the largest diameter: neighbours are in the 27 around.
   std::array<int, 3> cells;
@@ -288,8 +299,7 @@ void Packing::scatter() {
       for (std::uint64_t attempt = 0; attempt < 10000 && !placed; ++attempt) {
         const auto u = uniform2(random_bits(scene_.seed, Stream::packing, id, 2 + 2 * attempt));
         const auto w = uniform2(random_bits(scene_.seed, Stream::packing, id, 3 + 2 * attempt));
-        Vec3 x{u[0] * size[0], walls ? radius + u[1] * (size[1] - 2 * radius) : u[1] * size[1],
-               w[0] * size[2]};
+        const Vec3 x = point(u, w, radius);
         std::array<int, 3> at;
         for (int d = 0; d < 3; ++d)
           at[d] = std::min(static_cast<int>(x[d] / size[d] * cells[d]), cells[d] - 1);

@@ -21,8 +21,19 @@ constexpr double narrowest_mesh = 0.2;            // mean edge in dx: markers th
 
 void check_available(const Scene& scene, std::vector<std::string>& problems) {
   using Geometry = data::Domain::Geometry;
-  if (scene.domain.geometry == Geometry::tube || scene.domain.geometry == Geometry::stl)
-    problems.push_back("domain.geometry is not available in this version (slab and periodic are) use slab");
+  if (scene.domain.geometry == Geometry::stl && scene.flow.mean_velocity)
+    problems.push_back(
+        "flow.mean_velocity with a surface from a file (the driving force that gives it is not known) use "
+        "flow.pressure_gradient");
+  // Kernels reach two nodes beyond the wall: the box is periodic across, and the other side must be solid
+  // too.
+  for (int d = 0; d < 2 && scene.domain.geometry == Geometry::tube; ++d)
+    if (scene.domain.size[d] < scene.domain.tube_diameter + 4 * scene.fluid.dx - 1e-12)
+      problems.push_back(fmt::format(
+          "domain.size.{} is {:.4g} um (a tube of {:.4g} um wants 2 dx of solid on either side) make it "
+          "{:.4g} um or more",
+          d, 1e6 * scene.domain.size[d], 1e6 * scene.domain.tube_diameter,
+          1e6 * (scene.domain.tube_diameter + 4 * scene.fluid.dx)));
   if (scene.coupling.scheme != data::Coupling::Scheme::conservative)
     problems.push_back(
         "coupling.scheme is not available in this version (only conservative is) use conservative");
@@ -47,8 +58,8 @@ void check_flow(const Scene& scene, const LatticeUnits& units, std::vector<std::
   const ibm::Faces faces = make_faces(scene, units);
   double speed = std::max(std::abs(faces.lower_wall[2]), std::abs(faces.upper_wall[2]));
   for (int i = 1; i < 8; ++i)
-    speed =
-        std::max(speed, std::abs(steady_velocity(scene, units, units.length(scene.domain.size[1]) * i / 8)));
+    speed = std::max(speed, std::abs(steady_velocity(scene, units, units.length(scene.domain.size[0]) / 2,
+                                                     units.length(scene.domain.size[1]) * i / 8)));
   if (speed > largest_wall_speed)
     problems.push_back(
         fmt::format("the fastest flow is {:.3g} lattice units per step (limit {:g}: the fluid would be "

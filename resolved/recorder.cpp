@@ -6,6 +6,7 @@
 
 #include "resolved/build.hpp"
 #include "resolved/cross_section.hpp"
+#include "resolved/region.hpp"
 
 namespace hemowalk::resolved {
 
@@ -24,6 +25,9 @@ Recorder<Real>::Recorder(const Simulation<Real>& simulation) : planes_(simulatio
   record_.shear_rate = scene.flow.type == data::Flow::Type::couette ? scene.flow.shear_rate : 0;
   record_.box = scene.domain.size;
   record_.walls_y = {0, scene.domain.size[1]};
+  if (scene.domain.geometry == data::Domain::Geometry::tube)
+    for (int w = 0; w < 2; ++w)
+      record_.walls_y[w] = scene.domain.size[1] / 2 + (w ? 0.5 : -0.5) * scene.domain.tube_diameter;
   record_.seed = scene.seed;
   record_.scene_yaml = scene.source_text;
   record_.input_sha256 = scene.input_sha256;
@@ -51,8 +55,7 @@ Recorder<Real>::Recorder(const Simulation<Real>& simulation) : planes_(simulatio
         },
         group.cells);
   }
-  record_.hematocrit_true =
-      red_cell_volume / (scene.domain.size[0] * scene.domain.size[1] * scene.domain.size[2]);
+  record_.hematocrit_true = red_cell_volume / Region(scene).volume();
   for (int j = 0; j < planes_; ++j) record_.profile.y.push_back((j + 0.5) * scene.fluid.dx);
   velocity_sum_.assign(3 * planes_, 0), fluid_stress_sum_.assign(planes_, 0),
       hematocrit_sum_.assign(planes_, 0);

@@ -135,7 +135,7 @@ class Run {
       for (std::size_t i = tracks.position.size() - 3 * tracks.cells(); i < tracks.position.size(); ++i) {
         const double lower = recorder_.trajectories().walls_y[0], upper = recorder_.trajectories().walls_y[1];
         const std::size_t cell = (i % (3 * tracks.cells())) / 3;
-        const bool outside = i % 3 == 1 && scene_.domain.geometry == data::Domain::Geometry::slab &&
+        const bool outside = i % 3 == 1 && scene_.domain.geometry != data::Domain::Geometry::periodic &&
                              (tracks.position[i] < lower || tracks.position[i] > upper);
         if (!std::isfinite(tracks.position[i]) || outside)
           throw PhysicsError(fmt::format(

@@ -11,6 +11,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/region.hpp"
 #include "resolved/retraction.hpp"
 #include "resolved/slip_correction.hpp"
 
@@ -84,7 +85,17 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
 
 template <class Real>
 void Simulation<Real>::start_flow() {
-  fluid_.initialise([&](double y) { return steady_velocity(scene_, units_, y); });
+  if (const Region region(scene_); region.has_solid()) {
+    const int first = decomposition_.first_plane();
+    fluid_.set_solid([&](int i, int j, int k) { return region.solid(i, j, first + k); });
+    for (int k = 0; k < block_.nz; ++k)
+      for (int j = 0; j < block_.ny; ++j)
+        for (int i = 0; i < block_.nx; ++i)
+          if (fluid_.is_solid(i, j, k)) solid_nodes_.push_back(block_.at(i, j, k));
+  }
+  fluid_.initialise([&](double x, double y, double) {
+    return lbm::FlowPoint{1, {0, 0, steady_velocity(scene_, units_, x, y)}};
+  });
   fluid_.moments(velocity_.view());
   ibm::fill_velocity_halo(block_, faces_, velocity_.view());  // no force yet: u* is what markers read
   fields_.fill(velocity_.view());
@@ -359,10 +370,22 @@ void Simulation<Real>::spread() {
   }
   Stopwatch watch(timings_.spreading);
   force_on_walls_ = ibm::fold_force_halo(block_, faces_, force_.view());
+  take_force_from_solid();
   force_on_walls_[0] += contact_summary_.wall_force[0], force_on_walls_[1] += contact_summary_.wall_force[1];
   for (int d = 0; d < 3; ++d) {
     taken_.to_lower_wall[d] += h_ * force_on_walls_[0][d];
     taken_.to_upper_wall[d] += h_ * force_on_walls_[1][d];
+  }
+}
+
+/// What was spread on static solid is the solid's impulse, and no force on the fluid: the adjoint of reading
+/// zero velocity there.
+template <class Real>
+void Simulation<Real>::take_force_from_solid() {
+  for (const std::size_t n : solid_nodes_) {
+    Node4<Real>& f = force_[n];
+    taken_.to_solid[0] += h_ * f.x, taken_.to_solid[1] += h_ * f.y, taken_.to_solid[2] += h_ * f.z;
+    f = {0, 0, 0, 0};
   }
 }
 
@@ -433,6 +456,7 @@ void Simulation<Real>::step() {
     fluid_.end_advance(force, velocity_.view(), share);
     const auto impulse = fluid_.wall_impulse();
     taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
+    taken_.to_solid += impulse.solid;
     for (int d = 0; d < 3; ++d)
       taken_.from_body_force[d] +=
           fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
@@ -453,20 +477,21 @@ void Simulation<Real>::step() {
 std::array<double, 3> Momentum::total() const {
   std::array<double, 3> sum{};
   for (int d = 0; d < 3; ++d)
-    sum[d] = fluid[d] + cells[d] + to_lower_wall[d] + to_upper_wall[d] - from_body_force[d] - from_loads[d];
+    sum[d] = fluid[d] + cells[d] + to_lower_wall[d] + to_upper_wall[d] + to_solid[d] - from_body_force[d] -
+             from_loads[d];
   return sum;
 }
 
 double Momentum::scale() const {
   double sum = 0;
-  for (const auto* part : {&to_lower_wall, &to_upper_wall, &from_body_force, &from_loads, &fluid})
+  for (const auto* part : {&to_lower_wall, &to_upper_wall, &to_solid, &from_body_force, &from_loads, &fluid})
     for (const double component : *part) sum += std::abs(component);
   return sum;
 }
 
 template <class Real>
 Momentum Simulation<Real>::momentum() const {
-  static_assert(sizeof(Momentum) == 18 * sizeof(double));
+  static_assert(sizeof(Momentum) == 21 * sizeof(double));
   Momentum m = taken_;
   m.fluid = fluid_.totals().momentum;
   for (const auto& group : groups_)
@@ -479,7 +504,7 @@ Momentum Simulation<Real>::momentum() const {
               for (int d = 0; d < 3; ++d) m.cells[d] += group.mass[k] * v[layout.at(c, k, d)];
         },
         group.cells);
-  ranks().sum({m.fluid.data(), 18});
+  ranks().sum({m.fluid.data(), sizeof(Momentum) / sizeof(double)});
   return m;
 }
 

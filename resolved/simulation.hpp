@@ -69,6 +69,7 @@ struct Timings {
 struct Momentum {
   std::array<double, 3> fluid{}, cells{};
   std::array<double, 3> to_lower_wall{}, to_upper_wall{};  ///< since the start: fluid + spread + contact
+  std::array<double, 3> to_solid{};                        ///< static solid nodes, likewise
   std::array<double, 3> from_body_force{};                 ///< since the start
   std::array<double, 3> from_loads{};                      ///< since the start
 
@@ -150,6 +151,7 @@ class Simulation {
   void move_cells();
   void impulses();
   void spread();
+  void take_force_from_solid();
   void hand_over();
   /// Interpolation reads u* + this share of F where one theta serves both directions.
   Real velocity_share() const {
@@ -196,6 +198,7 @@ class Simulation {
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;
+  std::vector<std::size_t> solid_nodes_;  ///< static solid, in the fields
   std::int64_t fluid_steps_ = 0;
   Momentum taken_;  ///< accumulated parts of the budget, of this rank
   Timings timings_;
