@@ -61,7 +61,7 @@ TEST_P(Coverage, RecommendedEstimateIsRightWithinItsInterval) {
     const Layer core = core_layer(runs, e, options);
     const Lags lags = choose_lags(e, core, options);
     const Resampling resampling(e, options.bootstrap, s.seed);
-    const LocalFit fit = fit_local_law(e, lags.plateau, resampling, 0);
+    const LocalFit fit = fit_local_law(e, lags.plateau, resampling, options.bootstrap);
     const auto all = estimators(e, core, paper_layer(runs, e), lags, resampling, fit);
     const double total = true_layer_D(s, core.low, core.high) + jump_D(s);
     for (const Estimate& x : all)
