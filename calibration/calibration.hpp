@@ -91,6 +91,8 @@ struct Calibration {
     int visits = 0, left = 0;            ///< all stays after t0
     double mean_time = 0,
            mean_time_sigma = 0;  ///< s, time in the zone per departure (stays cut off are counted in)
+    int arrivals = 0;            ///< stays that began after t0
+    double mean_time_out = 0, mean_time_out_sigma = 0;  ///< s, time outside per arrival
   } residence;
   std::string shear_note;  ///< where law.scaling comes from
   std::vector<Verdict> verdict;

@@ -138,7 +138,10 @@ std::string to_json(const Calibration& c) {
                     {"visits", c.residence.visits},
                     {"left", c.residence.left},
                     {"mean_time_s", number(c.residence.mean_time)},
-                    {"mean_time_sigma", number(c.residence.mean_time_sigma)}};
+                    {"mean_time_sigma", number(c.residence.mean_time_sigma)},
+                    {"arrivals", c.residence.arrivals},
+                    {"mean_time_out_s", number(c.residence.mean_time_out)},
+                    {"mean_time_out_sigma", number(c.residence.mean_time_out_sigma)}};
   const double unit = law.conditions.shear_rate * red_cell_radius * red_cell_radius;
   j["law"] = {{"core_D_m2_per_s", number(law.core.D)},
               {"core_sigma", number(law.core.D_sigma)},

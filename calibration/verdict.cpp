@@ -81,8 +81,10 @@ std::string sentence(const Source& s, const Ours& o, const Verdict& v, const std
       differs.empty() ? "; conditions match" : "; conditions differ (" + differs + "), for orientation only";
   if (s.same_tracks && o.imported)
     out += "; the same trajectories, so a check of the program and not of the physics";
-  if (s.checked.find("memory") != std::string::npos || s.checked.find("abstract") != std::string::npos)
+  if (s.checked.find("memory") != std::string::npos)
     out += "; source not verified (" + s.checked + ")";
+  else if (s.checked.find("abstract") != std::string::npos)
+    out += "; source known by its abstract only (" + s.checked + ")";
   if (!o.gate_passed) out += "; our run fails the artefact gate";
   return out;
 }

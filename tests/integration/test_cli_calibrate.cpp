@@ -159,7 +159,8 @@ TEST(Calibrate, LawOverConditions) {
     auto s = few();
     s.shear_rate = g;
     s.D = 1e-12 * g;
-    const std::string name = "g" + std::to_string(static_cast<int>(g));
+    std::string name = "g";  // appended: GCC 12 warns of "g" + temporary
+    name += std::to_string(static_cast<int>(g));
     write(scratch, name + ".h5", calibration::generate(s));
     ASSERT_EQ(hemowalk(scratch, "calibrate " + name + ".h5 --out " + name + quick).code, 0);
   }

@@ -376,6 +376,8 @@ TEST(Residence, CountsVisitsByHand) {
   EXPECT_EQ(r.visits, 3);
   EXPECT_EQ(r.left, 2);
   EXPECT_NEAR(r.mean_time, (3 + 4 + 2) / 2.0, 1e-12);
+  EXPECT_EQ(r.arrivals, 2);
+  EXPECT_NEAR(r.mean_time_out, (2 + 2 + 5) / 2.0, 1e-12);
 }
 
 TEST(Layers, RbcRichLayerEndsAtHalfTheCoreHematocrit) {

@@ -54,7 +54,7 @@ TEST(Literature, SaysWithWhichSourceUnderWhichConditionsByHowMuch) {
   EXPECT_NEAR(t.z, (1.25 - 0.15) / std::hypot(0.05, 0.1), 1e-9);
   EXPECT_FALSE(t.matched_conditions);
   EXPECT_TRUE(mentions(t.statement, "radial instead of wall-normal"));
-  EXPECT_TRUE(mentions(t.statement, "not verified"));
+  EXPECT_TRUE(mentions(t.statement, "abstract only"));
   const Verdict& z = find(all, "zydney_colton1988");
   EXPECT_TRUE(z.matched_conditions);
   EXPECT_NEAR(z.D_lo, 2.81e-11, 0.01e-11);

@@ -105,10 +105,13 @@ void print_result(const calibration::Calibration& c) {
              c.law.core.D_sigma * 1e10, c.core_estimator, c.core_reason);
   fmt::print("step law {}\n", c.step_reason);
   if (!c.shear_note.empty()) fmt::print("shear: {}\n", c.shear_note);
-  if (c.residence.visits)
-    fmt::print("near the walls ({:.2g} um): of {} at t0 {} leave again; {} of all {} stays end\n",
-               c.residence.zone * 1e6, c.residence.near_at_t0, c.residence.left_of_t0, c.residence.left,
-               c.residence.visits);
+  if (const auto& r = c.residence; r.visits)
+    fmt::print(
+        "near the walls ({:.2g} um): of {} at t0 {} leave again; mean stay {:.2g} +- {:.1g} s, mean time "
+        "away "
+        "{:.2g} +- {:.1g} s\n",
+        r.zone * 1e6, r.near_at_t0, r.left_of_t0, r.mean_time, r.mean_time_sigma, r.mean_time_out,
+        r.mean_time_out_sigma);
   print_chart(c);
   if (!c.verdict.empty()) fmt::print("\n");
   for (const auto& v : c.verdict) fmt::print("{}\n", v.statement);
