@@ -91,6 +91,8 @@ struct Calibration {
     int visits = 0, left = 0;            ///< all stays after t0
     double mean_time = 0,
            mean_time_sigma = 0;  ///< s, time in the zone per departure (stays cut off are counted in)
+    int arrivals = 0;            ///< stays that began after t0
+    double mean_time_out = 0, mean_time_out_sigma = 0;  ///< s, time outside per arrival
   } residence;
   std::string shear_note;  ///< where law.scaling comes from
   std::vector<Verdict> verdict;
@@ -117,14 +119,31 @@ data::Trajectories import_text_folder(const std::string& folder);
 struct Trend {
   std::string name;                   ///< "ln shear rate", "hematocrit", "ln kappa/(1-kappa)", ...
   double coefficient = 0, sigma = 0;  ///< change of ln D per unit of it
+  double centre = 0;                  ///< mean over the calibrations
+  std::array<double, 2> range{};      ///< what the calibrations span
   bool claimed = false;               ///< beyond two standard errors
   std::string statement;              ///< in words: the effect, or "not distinguishable"
 };
-/// D over conditions: ln D linear in what varies between the calibrations, weighted by their errors.
+/// A claim that was stated, with its sign, before the data (docs/calibration.md), and what the data say.
+struct Hypothesis {
+  std::string claim;    ///< in words
+  std::string about;    ///< the trend it predicts the sign of
+  int sign = 0;         ///< of that trend's coefficient
+  std::string outcome;  ///< "supported" | "contradicted" | "not distinguishable" | "not tested"
+  std::string statement;
+};
+/// The law over conditions: ln D linear in what varies between the calibrations, weighted by their errors.
 struct ConditionFit {
   double D_centre = 0;  ///< m2/s, at the mean conditions
   std::vector<Trend> trends;
-  std::vector<std::string> left_out;          ///< what could not be told apart, and why
+  /// Of (ln D_centre, coefficients), row-major; its first row and column belong to ln D_centre.
+  std::vector<std::vector<double>> covariance;
+  double scatter = 0;                  ///< of ln D between calibrations beyond their stated errors
+  double shear_exponent = 1;           ///< D ~ shear rate^n: the fitted one where the shear rate varies
+  double shear_exponent_sigma = 0;     ///< else the weighted mean of what the runs say
+  std::vector<Hypothesis> hypotheses;  ///< all that are stated, tested or not
+  std::vector<std::string> left_out;   ///< what could not be told apart, and why
+  std::vector<std::string> warnings;   ///< what a reader of the law must know
   std::vector<std::array<double, 2>> scaled;  ///< D/(gamma r^2) and its error per calibration, r = 4 um
   double chi_squared = 0;
   int degrees_of_freedom = 0;
@@ -133,6 +152,16 @@ struct ConditionFit {
 /// A trend is claimed only beyond two standard errors; scatter beyond the stated errors widens them.
 /// \throws InputError for fewer than two calibrations or one without an error.
 ConditionFit fit_conditions(const std::vector<data::TransportLaw>& laws);
+
+/// Transport law at other conditions (NaN = the mean of the calibrations where they vary): D from the
+/// regression with its error, the profile of the nearest calibration with every distance to the nearer wall
+/// kept. What does not vary between the calibrations stays; shear rate within their ranges goes with the
+/// fitted exponent. \throws Refused outside what the calibrations span.
+data::TransportLaw law_at(const ConditionFit& fit, const std::vector<data::TransportLaw>& laws,
+                          const data::TransportLaw::Conditions& at);
+
+/// The file `law_over_conditions.json` as text: SI, every digit that matters, validity ranges inside.
+std::string conditions_json(const ConditionFit& fit, const std::vector<data::TransportLaw>& laws);
 
 /// What a planned error costs.
 struct PlanInput {

@@ -21,8 +21,11 @@ struct MemoryFit {
   /// MSD(lag)/(2 D lag): below 1 where the lag is not long against the memory.
   double factor(double lag) const;
 };
+/// D(\p to steps) - D(\p from steps) in units of its own standard error, paired over cells.
+double rise(const Ensemble& ensemble, const Layer& layer, int from, int to);
+
 /// Weighted least squares on the time-averaged MSD; memory is only reported when D at the shortest lag lies
-/// two standard errors below D at \p long_lag (paired over cells).
+/// three standard errors below D at \p long_lag (paired over cells).
 MemoryFit fit_memory(const Ensemble& ensemble, const Layer& layer, double long_lag);
 
 /// The lags at which D is read.
@@ -83,9 +86,11 @@ double jump_threshold(const Ensemble& ensemble);
 Estimate without_jumps(const Ensemble& ensemble, const Layer& layer, double lag,
                        const Resampling& resampling);
 
-/// `plateau` corrected by the fitted local law for what happens within the lag: walls and the variation of
-/// D(y). The factor is (mean D over the layer)/(MSD of the law's own propagator/(2 lag)).
-Estimate local(const Estimate& plateau, const LocalFit& fit, const Layer& layer);
+/// `plateau` at the fit's lag, corrected by the fitted local law for what happens within the lag: walls and
+/// the variation of D(y). The factor is (mean D over the layer)/(MSD of the law's own propagator/(2 lag));
+/// its error is in the draws. Needs a fit with draws.
+Estimate local(const Ensemble& ensemble, const Layer& layer, const Resampling& resampling,
+               const LocalFit& fit);
 
 /// All estimators of docs/reference.md (paper, paper_all, plateau, gls, green_kubo), then memory, confined,
 /// local and without_jumps.
@@ -93,7 +98,7 @@ std::vector<Estimate> estimators(const Ensemble& ensemble, const Layer& core, co
                                  const Lags& lags, const Resampling& resampling, const LocalFit& fit);
 
 /// The estimate that goes into the law, and why: `plateau`, unless memory biases it by more than its error
-/// (`gls`) or the walls by more than half of it (`confined`).
+/// (`memory`) or walls and D(y) by more than a tenth of it (`local`).
 struct Recommended {
   Estimate estimate;
   std::string reason;

@@ -25,7 +25,8 @@ std::string text(const char* format, Args... args) {
 
 data::Finding finding(const std::string& name, double value, double limit, bool passed,
                       const std::string& note) {
-  return {name, value, limit, passed, note};
+  // A value that is no number (NaN in the records) stays a failure, but a file holds numbers only.
+  return {name, std::isfinite(value) ? value : nan, limit, passed, note};
 }
 
 /// Slope of values against y over [low, high], weighted; NaN when fewer than three bins hold cells.
@@ -102,8 +103,8 @@ data::Finding vorticity(const CellVelocity& v, double wall_speed) {
 }
 
 /// u(y) + u(mirrored y) is the same at all heights when the profile is antisymmetric about the middle.
-data::Finding antisymmetry(const std::vector<double>& y, const std::vector<double>& u,
-                           const std::vector<double>& sigma, double wall_speed) {
+void antisymmetry(const std::vector<double>& y, const std::vector<double>& u,
+                  const std::vector<double>& sigma, double wall_speed, std::vector<data::Finding>& out) {
   double low = std::numeric_limits<double>::max(), high = -low, low_s = 0, high_s = 0;
   for (std::size_t k = 0; 2 * k + 1 <= y.size(); ++k) {
     const std::size_t m = y.size() - 1 - k;
@@ -112,12 +113,13 @@ data::Finding antisymmetry(const std::vector<double>& y, const std::vector<doubl
     if (sum < low) std::tie(low, low_s) = std::pair{sum, s};
     if (sum > high) std::tie(high, high_s) = std::pair{sum, s};
   }
+  if (high < low) return;  // no two mirrored heights with cells
   const double value = (high - low) / wall_speed, z = (high - low) / std::hypot(low_s, high_s);
-  return finding(
+  out.push_back(finding(
       "velocity_antisymmetry", value, 0.1, value <= 0.1 || z <= significant,
       text("u(y) + u(mirror) varies by %.0f %% of the wall speed (%.0f standard errors): the halves shear "
            "differently",
-           100 * value, z));
+           100 * value, z)));
 }
 
 void shear(const std::vector<double>& y, const std::vector<double>& u, const std::vector<double>& sigma,
@@ -303,7 +305,7 @@ data::TransportLaw::Gate artefact_gate(const std::vector<data::Trajectories>& ru
     const auto& y = flow.y.empty() ? cells.y : flow.y;
     const auto& u = flow.y.empty() ? cells.along : flow.along;
     const auto& s = flow.y.empty() ? cells.along_sigma : flow.sigma;
-    f.push_back(antisymmetry(y, u, s, wall_speed));
+    antisymmetry(y, u, s, wall_speed, f);
     shear(y, u, s, e, f);
     stress(flow, f);
   }

@@ -331,17 +331,17 @@ StepSelection select_step_law(const Ensemble& e, const Layer& core, const HalfFi
 Calibration::Residence residence(const Ensemble& e, const Layer& core, double zone) {
   Calibration::Residence r;
   r.zone = zone;
-  double at_risk = 0;
+  double inside = 0, outside = 0;  // s
   for (const Path& p : e.paths) {
     const Run& run = e.run_of(p);
     bool near = false, first = true;
     for (std::size_t i = run.origin; i < p.y.size(); ++i) {
       const double height = std::min(p.y[i] - e.walls[0], e.walls[1] - p.y[i]);
-      if (near && i > run.origin) at_risk += run.time[i] - run.time[i - 1];
+      if (i > run.origin) (near ? inside : outside) += run.time[i] - run.time[i - 1];
       if (!near && height < zone) {
         near = true;
         ++r.visits;
-        if (i == run.origin) ++r.near_at_t0;
+        ++(i == run.origin ? r.near_at_t0 : r.arrivals);
         first = i == run.origin;
       } else if (near && core.contains(p.y[i])) {
         near = false;
@@ -350,8 +350,13 @@ Calibration::Residence residence(const Ensemble& e, const Layer& core, double zo
       }
     }
   }
-  r.mean_time = r.left > 0 ? at_risk / r.left : nan;
-  r.mean_time_sigma = r.left > 0 ? r.mean_time / std::sqrt(static_cast<double>(r.left)) : nan;
+  // Exponential stays: the maximum-likelihood mean is the time at risk per end, its error 1/sqrt(ends).
+  const auto mean_time = [](double time, int ends, double& value, double& sigma) {
+    value = ends > 0 ? time / ends : nan;
+    sigma = ends > 0 ? value / std::sqrt(static_cast<double>(ends)) : nan;
+  };
+  mean_time(inside, r.left, r.mean_time, r.mean_time_sigma);
+  mean_time(outside, r.arrivals, r.mean_time_out, r.mean_time_out_sigma);
   return r;
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calibration/calibration.hpp"
+#include "calibration/conditions.hpp"
 #include "core/provenance.hpp"
 
 namespace hemowalk::calibration {
@@ -137,9 +138,15 @@ std::string to_json(const Calibration& c) {
                     {"visits", c.residence.visits},
                     {"left", c.residence.left},
                     {"mean_time_s", number(c.residence.mean_time)},
-                    {"mean_time_sigma", number(c.residence.mean_time_sigma)}};
+                    {"mean_time_sigma", number(c.residence.mean_time_sigma)},
+                    {"arrivals", c.residence.arrivals},
+                    {"mean_time_out_s", number(c.residence.mean_time_out)},
+                    {"mean_time_out_sigma", number(c.residence.mean_time_out_sigma)}};
+  const double unit = law.conditions.shear_rate * red_cell_radius * red_cell_radius;
   j["law"] = {{"core_D_m2_per_s", number(law.core.D)},
               {"core_sigma", number(law.core.D_sigma)},
+              {"D_over_gamma_r2", number(law.core.D / unit)},
+              {"D_over_gamma_r2_sigma", number(law.core.D_sigma / unit)},
               {"core_estimator", c.core_estimator},
               {"core_reason", c.core_reason},
               {"memory_s", number(law.memory)},

@@ -45,11 +45,6 @@ Matrix penalty(int nD, int npi) {
   return h;
 }
 
-Vector coefficients(const LocalLaw& law) {
-  Vector t(law.parameters());
-  t << law.log_D, law.log_pi;
-  return t;
-}
 LocalLaw with_coefficients(LocalLaw law, const Vector& t) {
   const Eigen::Index nD = law.log_D.size();
   law.log_D = t.head(nD);
@@ -161,6 +156,23 @@ double LocalLaw::mean_D(double low, double high) const {
   return sum / n;
 }
 
+Vector LocalLaw::coefficients() const {
+  Vector t(parameters());
+  t << log_D, log_pi;
+  return t;
+}
+
+Vector LocalLaw::mean_D_gradient(double low, double high) const {
+  constexpr int n = 128;
+  const SplineBasis basis(walls[0], walls[1], static_cast<int>(log_D.size()));
+  Vector sum = Vector::Zero(parameters());
+  for (int k = 0; k < n; ++k) {
+    const double y = low + (high - low) * (k + 0.5) / n;
+    sum.head(log_D.size()) += D(y) / n * basis.values(y);
+  }
+  return sum;
+}
+
 std::vector<double> LocalLaw::equilibrium(const std::vector<double>& y) const {
   const SplineBasis basis(walls[0], walls[1], static_cast<int>(log_pi.size()));
   std::vector<double> p;
@@ -197,10 +209,9 @@ Propagator::Propagator(const LocalLaw& law, int cells, double lag)
   P_ = root_pi_.cwiseInverse().asDiagonal() * symmetric_ * root_pi_.asDiagonal();
 }
 
-std::vector<Matrix> Propagator::derivatives() const {
+Matrix Propagator::divided_differences() const {
+  // Of exp: the derivative of a matrix exponential in the eigenbasis (Daleckii and Krein).
   const Eigen::Index n = P_.rows();
-  // Divided differences of exp: the derivative of a matrix exponential in the eigenbasis (Daleckii and
-  // Krein).
   Matrix difference(n, n);
   for (Eigen::Index a = 0; a < n; ++a)
     for (Eigen::Index b = 0; b < n; ++b) {
@@ -208,51 +219,83 @@ std::vector<Matrix> Propagator::derivatives() const {
       const double ratio = std::abs(x) < 1e-6 ? 1 + x / 2 : std::expm1(x) / x;
       difference(a, b) = lag_ * std::exp(value_(b) * lag_) * ratio;
     }
-  const Eigen::Index nD = face_basis_.cols(), npi = cell_basis_.cols();
-  std::vector<Matrix> all(static_cast<std::size_t>(nD + npi));
-  for (Eigen::Index c = 0; c < nD + npi; ++c) {
-    Vector off = Vector::Zero(n - 1), diagonal = Vector::Zero(n);
-    Vector dlog_pi = Vector::Zero(n);
-    if (c >= nD) dlog_pi = cell_basis_.col(c - nD);
-    for (Eigen::Index i = 0; i + 1 < n; ++i) {
-      const double up = rate_(i) * root_pi_(i + 1) / root_pi_(i),
-                   down = rate_(i) * root_pi_(i) / root_pi_(i + 1);
-      if (c < nD) {
-        off(i) = rate_(i) * face_basis_(i, c);
-        diagonal(i) -= up * face_basis_(i, c);
-        diagonal(i + 1) -= down * face_basis_(i, c);
-      } else {
-        const double tilt = (dlog_pi(i + 1) - dlog_pi(i)) / 2;
-        diagonal(i) -= up * tilt;
-        diagonal(i + 1) += down * tilt;
-      }
+  return difference;
+}
+
+Propagator::GeneratorDerivative Propagator::generator_derivative(Eigen::Index c) const {
+  const Eigen::Index n = P_.rows(), nD = face_basis_.cols();
+  GeneratorDerivative d{Vector::Zero(n), Vector::Zero(n - 1), Vector::Zero(n)};
+  if (c >= nD) d.log_pi = cell_basis_.col(c - nD);
+  for (Eigen::Index i = 0; i + 1 < n; ++i) {
+    const double up = rate_(i) * root_pi_(i + 1) / root_pi_(i),
+                 down = rate_(i) * root_pi_(i) / root_pi_(i + 1);
+    if (c < nD) {
+      d.off(i) = rate_(i) * face_basis_(i, c);
+      d.diagonal(i) -= up * face_basis_(i, c);
+      d.diagonal(i + 1) -= down * face_basis_(i, c);
+    } else {
+      const double tilt = (d.log_pi(i + 1) - d.log_pi(i)) / 2;
+      d.diagonal(i) -= up * tilt;
+      d.diagonal(i + 1) += down * tilt;
     }
-    Matrix dH_V = diagonal.asDiagonal() * vectors_;
-    dH_V.topRows(n - 1) += off.asDiagonal() * vectors_.bottomRows(n - 1);
-    dH_V.bottomRows(n - 1) += off.asDiagonal() * vectors_.topRows(n - 1);
+  }
+  return d;
+}
+
+std::vector<Matrix> Propagator::derivatives() const {
+  const Eigen::Index n = P_.rows(), nD = face_basis_.cols(), all_of_them = nD + cell_basis_.cols();
+  const Matrix difference = divided_differences();
+  std::vector<Matrix> all(static_cast<std::size_t>(all_of_them));
+  for (Eigen::Index c = 0; c < all_of_them; ++c) {
+    const GeneratorDerivative g = generator_derivative(c);
+    Matrix dH_V = g.diagonal.asDiagonal() * vectors_;
+    dH_V.topRows(n - 1) += g.off.asDiagonal() * vectors_.bottomRows(n - 1);
+    dH_V.bottomRows(n - 1) += g.off.asDiagonal() * vectors_.topRows(n - 1);
     const Matrix inner = (vectors_.transpose() * dH_V).cwiseProduct(difference);
     Matrix d = vectors_ * inner * vectors_.transpose();
     d = root_pi_.cwiseInverse().asDiagonal() * d * root_pi_.asDiagonal();
-    if (c >= nD) d += 0.5 * (P_ * dlog_pi.asDiagonal()) - 0.5 * (dlog_pi.asDiagonal() * P_);
+    if (c >= nD) d += 0.5 * (P_ * g.log_pi.asDiagonal()) - 0.5 * (g.log_pi.asDiagonal() * P_);
     all[static_cast<std::size_t>(c)] = std::move(d);
   }
   return all;
 }
 
-double Propagator::msd(double low, double high) const {
+Matrix Propagator::msd_weights(double low, double high) const {
   const Eigen::Index n = P_.rows();
-  double sum = 0, weight = 0;
+  Matrix w(n, n);
+  double total = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const double a = law_.walls[0] + static_cast<double>(i) * width_, b = a + width_;
-    const double w = std::max(0.0, std::min(b, high) - std::max(a, low));
-    if (w <= 0) continue;
-    weight += w;
+    const double inside = std::max(0.0, std::min(b, high) - std::max(a, low));
+    total += inside;
     for (Eigen::Index j = 0; j < n; ++j) {
       const double d = static_cast<double>(j - i) * width_;
-      sum += w * P_(i, j) * d * d;
+      w(i, j) = inside * d * d;
     }
   }
-  return sum / weight;
+  return w / total;
+}
+
+double Propagator::msd(double low, double high) const {
+  return msd_weights(low, high).cwiseProduct(P_).sum();
+}
+
+Vector Propagator::msd_gradient(double low, double high) const {
+  // Backwards through the exponential: sum of weights x dP = sum of M x dH, M computed once.
+  const Eigen::Index n = P_.rows(), nD = face_basis_.cols(), all = nD + cell_basis_.cols();
+  const Matrix w = msd_weights(low, high);
+  const Matrix A = root_pi_.cwiseInverse().asDiagonal() * w * root_pi_.asDiagonal();
+  const Matrix B = (vectors_.transpose() * A * vectors_).cwiseProduct(divided_differences());
+  const Matrix M = vectors_ * B * vectors_.transpose();
+  const Matrix flow = w.cwiseProduct(P_);
+  const Vector scale = (flow.colwise().sum().transpose() - flow.rowwise().sum()) / 2;
+  Vector gradient(all);
+  for (Eigen::Index c = 0; c < all; ++c) {
+    const GeneratorDerivative g = generator_derivative(c);
+    gradient(c) = M.diagonal().dot(g.diagonal) + scale.dot(g.log_pi);
+    for (Eigen::Index i = 0; i + 1 < n; ++i) gradient(c) += g.off(i) * (M(i, i + 1) + M(i + 1, i));
+  }
+  return gradient;
 }
 
 LocalFit fit_local_law(const Ensemble& e, double lag, const Resampling& resampling, int draws,
@@ -285,7 +328,7 @@ LocalFit fit_local_law(const Ensemble& e, double lag, const Resampling& resampli
   const Transitions transitions = count_transitions(e, steps, fit.cells, use);
   const Matrix count = transitions.count / steps, prior = penalty(knots, knots);
   const auto objective = [&](const LocalLaw& l) {
-    const Vector t = coefficients(l);
+    const Vector t = l.coefficients();
     return log_likelihood(count, Propagator(l, fit.cells, fit.lag).matrix()) - 0.5 * t.dot(prior * t);
   };
 
@@ -297,7 +340,7 @@ LocalFit fit_local_law(const Ensemble& e, double lag, const Resampling& resampli
     const Propagator propagator(law, fit.cells, fit.lag);
     score = score_matrices(propagator);
     score_and_information(score, count, observed(propagator.matrix()), gradient, information);
-    const Vector t = coefficients(law), slope = gradient - prior * t;
+    const Vector t = law.coefficients(), slope = gradient - prior * t;
     const Vector step = (information + prior).ldlt().solve(slope);
     if (slope.dot(step) < 1e-4) break;  // expected gain in log-likelihood, far below one standard error (1/2)
     double reach = 1;
@@ -332,7 +375,7 @@ LocalFit fit_local_law(const Ensemble& e, double lag, const Resampling& resampli
   const Vector mean_reaction = reaction.rowwise().mean();
   const Matrix centred = reaction.colwise() - mean_reaction;
   fit.covariance = centred * centred.transpose();
-  const Vector t = coefficients(law);
+  const Vector t = law.coefficients();
   for (int b = 0; b < std::min(draws, resampling.draws()); ++b) {
     Vector move = Vector::Zero(n);
     for (std::size_t p = 0; p < e.paths.size(); ++p)

@@ -41,6 +41,9 @@ struct LocalLaw {
   double D(double y) const;
   double v(double y) const;  ///< D (ln pi)', without D', m/s
   double mean_D(double low, double high) const;
+  Eigen::VectorXd coefficients() const;  ///< log_D, then log_pi
+  /// d mean_D / d coefficients, m2/s.
+  Eigen::VectorXd mean_D_gradient(double low, double high) const;
   /// Equilibrium density pi at the given heights (uniform grid over the gap), 1/m.
   std::vector<double> equilibrium(const std::vector<double>& y) const;
 };
@@ -55,8 +58,18 @@ class Propagator {
   std::vector<Eigen::MatrixXd> derivatives() const;
   /// Mean-squared displacement from starts spread evenly over the layer [low, high], m2.
   double msd(double low, double high) const;
+  /// d msd / d coefficients, m2.
+  Eigen::VectorXd msd_gradient(double low, double high) const;
 
  private:
+  /// Derivative of the symmetric generator (diagonal, off-diagonal) and of ln pi by one coefficient.
+  struct GeneratorDerivative {
+    Eigen::VectorXd diagonal, off, log_pi;
+  };
+  GeneratorDerivative generator_derivative(Eigen::Index coefficient) const;
+  Eigen::MatrixXd divided_differences() const;
+  Eigen::MatrixXd msd_weights(double low, double high) const;  ///< msd = sum of these times P
+
   LocalLaw law_;
   double lag_, width_;
   Eigen::VectorXd rate_, value_;  // face rates D/h^2; eigenvalues of the symmetric generator

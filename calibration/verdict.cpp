@@ -41,8 +41,8 @@ Source read_source(const YAML::Node& n) {
   s.high = value(n["high"]);
   s.same_tracks = n["same_tracks"].as<bool>(false);
   if (const auto f = n["formula"])
-    s.formula =
-        Source::Formula{f["prefactor"].as<double>(), f["exponent"].as<double>(), range(f["radius_m"])};
+    s.formula = Formula{f["prefactor"].as<double>(), f["exponent"].as<double>(), f["phi_power"].as<double>(1),
+                        range(f["radius_m"])};
   require(s.D.has_value() != s.formula.has_value(),
           "literature source " + s.id +
               " has neither or both of D and formula (one of them is needed) repair the file");
@@ -81,16 +81,19 @@ std::string sentence(const Source& s, const Ours& o, const Verdict& v, const std
       differs.empty() ? "; conditions match" : "; conditions differ (" + differs + "), for orientation only";
   if (s.same_tracks && o.imported)
     out += "; the same trajectories, so a check of the program and not of the physics";
-  if (s.checked.find("memory") != std::string::npos || s.checked.find("abstract") != std::string::npos)
+  if (s.checked.find("memory") != std::string::npos)
     out += "; source not verified (" + s.checked + ")";
+  else if (s.checked.find("abstract") != std::string::npos)
+    out += "; source known by its abstract only (" + s.checked + ")";
   if (!o.gate_passed) out += "; our run fails the artefact gate";
   return out;
 }
 
 }  // namespace
 
-double zydney_colton(double prefactor, double exponent, double radius, double shear_rate, double hematocrit) {
-  return prefactor * radius * radius * shear_rate * hematocrit * std::pow(1 - hematocrit, exponent);
+double Formula::operator()(double radius, double shear_rate, double hematocrit) const {
+  return prefactor * radius * radius * shear_rate * std::pow(hematocrit, phi_power) *
+         std::pow(1 - hematocrit, exponent);
 }
 
 std::vector<Source> read_literature(const std::string& content) {
@@ -111,7 +114,8 @@ std::vector<Verdict> compare_with_literature(const Ours& ours, const std::vector
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<Verdict> all;
   for (const Source& s : sources) {
-    const bool any_particle = s.formula && ours.particle == "rbc";  // the formula is about what red cells do
+    // The formulas proper are about what red cells do.
+    const bool any_particle = s.kind == "formula" && ours.particle == "rbc";
     if ((s.particle == "rbc") != (ours.particle == "rbc") && !any_particle) continue;
     Verdict v;
     v.source = s.id;
@@ -119,9 +123,7 @@ std::vector<Verdict> compare_with_literature(const Ours& ours, const std::vector
     v.D_hi = s.high.value_or(nan);
     if (s.formula) {
       std::vector<double> values;
-      for (double a : s.formula->radii)
-        values.push_back(
-            zydney_colton(s.formula->prefactor, s.formula->exponent, a, ours.shear_rate, ours.hematocrit));
+      for (double a : s.formula->radii) values.push_back((*s.formula)(a, ours.shear_rate, ours.hematocrit));
       if (values.empty() || !std::isfinite(values.front())) continue;  // our conditions are not known
       v.D_lo = *std::min_element(values.begin(), values.end());
       v.D_hi = *std::max_element(values.begin(), values.end());

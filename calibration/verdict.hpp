@@ -12,16 +12,17 @@ namespace hemowalk::calibration {
 /// literature.yaml as compiled in.
 extern const char* const literature_text;
 
-/// D = prefactor a^2 gamma phi (1 - phi)^exponent, m2/s (Zydney and Colton 1988; constants in
-/// literature.yaml).
-double zydney_colton(double prefactor, double exponent, double radius, double shear_rate, double hematocrit);
+/// D = prefactor a^2 gamma phi^phi_power (1 - phi)^exponent. Zydney and Colton 1988: 0.15, phi_power 1, 0.8;
+/// Leighton and Acrivos 1987, dilute limit: 0.5, phi_power 2, 0.
+struct Formula {
+  double prefactor = 0, exponent = 0, phi_power = 1;
+  std::vector<double> radii;  ///< m
+  /// m2/s for one radius (m), shear rate (1/s) and hematocrit.
+  double operator()(double radius, double shear_rate, double hematocrit) const;
+};
 
 /// One entry of literature.yaml.
 struct Source {
-  struct Formula {
-    double prefactor = 0, exponent = 0;
-    std::vector<double> radii;  ///< m
-  };
   std::string id, citation, particle, kind, direction, method, checked, note;
   std::vector<double> shear_rate, hematocrit;  ///< ranges; empty = not stated
   std::optional<double> D, low, high;          ///< m2/s

@@ -1,4 +1,5 @@
 hemowalk_test(test_calibration_verdict SOURCES unit/test_calibration_verdict.cpp LINK hemowalk_calibration LABELS unit)
+hemowalk_test(test_calibration_conditions SOURCES unit/test_calibration_conditions.cpp LINK hemowalk_calibration LABELS unit)
 hemowalk_test(test_calibration_estimators SOURCES unit/test_calibration_estimators.cpp LINK hemowalk_calibration LABELS unit)
 hemowalk_test(test_calibration_recovery SOURCES verification/test_calibration_recovery.cpp LINK hemowalk_calibration
               LABELS verification)

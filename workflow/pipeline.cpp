@@ -152,6 +152,23 @@ class Pipeline {
       points_.push_back(entry);
       save();
     }
+    compare_points();
+  }
+
+  /// What the laws of all points say together, where their conditions differ.
+  void compare_points() {
+    std::vector<data::TransportLaw> laws;
+    for (const auto& entry : points_)
+      if (entry.contains("law_file"))
+        laws.push_back(data::read_transport_law(folder_ / entry["law_file"].get<std::string>()));
+    if (laws.size() < 2) return;
+    const auto fit = calibration::fit_conditions(laws);
+    if (fit.trends.empty()) return;
+    const std::string text = calibration::conditions_json(fit, laws);
+    write_file_atomic(folder_ / "law_over_conditions.json", text);
+    over_conditions_ = Json::parse(text);
+    for (const auto& h : fit.hypotheses)
+      if (h.outcome != "not tested") summary_.headlines.push_back(h.statement);
   }
 
   /// The result for the terminal, and the gate for the exit code.
@@ -299,6 +316,7 @@ class Pipeline {
       json["runs"].push_back(entry);
     }
     json["points"] = points_;
+    if (!over_conditions_.is_null()) json["over_conditions"] = over_conditions_;
     json["coarse"] = walks_;
     json["campaign_yaml"] = campaign_.source_text;
     return json;
@@ -329,7 +347,7 @@ class Pipeline {
   Plan plan_;
   fs::path folder_;
   PipelineSummary summary_;
-  Json previous_ = Json::object(), points_ = Json::array(), walks_ = Json::array();
+  Json previous_ = Json::object(), points_ = Json::array(), walks_ = Json::array(), over_conditions_;
   bool final_ = false;
   std::string trouble_;  ///< the first point whose main kind could not be calibrated
 };

@@ -212,6 +212,24 @@ TEST(Propagator, DerivativesAgreeWithDifferences) {
   }
 }
 
+TEST(Propagator, GradientsAgreeWithDifferences) {
+  const LocalLaw law = wavy_law();
+  const double low = 7e-6, high = 29e-6;
+  const Eigen::VectorXd msd = Propagator(law, 40, 20e-3).msd_gradient(low, high),
+                        D = law.mean_D_gradient(low, high);
+  for (int c = 0; c < 18; ++c) {
+    const auto moved = [&](double by) {
+      LocalLaw l = law;
+      (c < 9 ? l.log_D(c) : l.log_pi(c - 9)) += by;
+      return std::pair{Propagator(l, 40, 20e-3).msd(low, high), l.mean_D(low, high)};
+    };
+    const auto up = moved(1e-5), down = moved(-1e-5);
+    // MSD of some 5e-12 m2 and D of 1e-10 m2/s, relative errors as above.
+    EXPECT_NEAR(msd(c), (up.first - down.first) / 2e-5, 1e-8 * 5e-12) << c;
+    EXPECT_NEAR(D(c), (up.second - down.second) / 2e-5, 1e-8 * 1e-10) << c;
+  }
+}
+
 TEST(Propagator, MsdOfConstantDIsTheSlabSeries) {
   LocalLaw law;
   law.walls = {0, 20e-6};
@@ -358,6 +376,8 @@ TEST(Residence, CountsVisitsByHand) {
   EXPECT_EQ(r.visits, 3);
   EXPECT_EQ(r.left, 2);
   EXPECT_NEAR(r.mean_time, (3 + 4 + 2) / 2.0, 1e-12);
+  EXPECT_EQ(r.arrivals, 2);
+  EXPECT_NEAR(r.mean_time_out, (2 + 2 + 5) / 2.0, 1e-12);
 }
 
 TEST(Layers, RbcRichLayerEndsAtHalfTheCoreHematocrit) {

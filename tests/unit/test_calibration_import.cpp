@@ -77,6 +77,43 @@ TEST(Checks, TooShort) {
   o.t0 = 0.48;
   EXPECT_TRUE(mentions(refusal_of(good(), o), "too short a run"));
 }
+// Whatever the length and the number of cells: a refusal, or a law of finite numbers that its own reader
+// takes.
+TEST(Checks, ShortRunsGiveAFiniteLawOrNone) {
+  const auto file = fs::temp_directory_path() / ("hemowalk_law_" + std::to_string(::getpid()) + ".yaml");
+  int laws = 0, refusals = 0;
+  for (int platelets : {2, 6})
+    for (double duration : {0.03, 0.042, 0.05, 0.1})
+      for (double gap : {10e-6, 50e-6}) {
+        Synthetic s;
+        s.platelets = platelets;
+        s.duration = duration;
+        s.gap = gap;
+        s.seed = 7;
+        Options o;
+        o.t0 = 0;
+        o.bootstrap = 20;
+        try {
+          const Calibration c = calibrate({generate(s)}, o);
+          ++laws;
+          EXPECT_TRUE(c.law.core.D > 0 && std::isfinite(c.law.core.D_sigma)) << platelets << " " << duration;
+          for (const auto* rows : {&c.law.profile.D_draws, &c.law.profile.v_draws})
+            for (const auto& row : *rows)
+              for (double v : row)
+                ASSERT_TRUE(std::isfinite(v)) << platelets << " " << duration << " " << gap;
+          for (const auto* row : {&c.law.profile.D, &c.law.profile.v})
+            for (double v : *row) ASSERT_TRUE(std::isfinite(v)) << platelets << " " << duration << " " << gap;
+          ASSERT_NO_THROW(data::write_transport_law(c.law, file.string()));
+          ASSERT_NO_THROW(data::read_transport_law(file.string()));
+        } catch (const InputError& e) {
+          ++refusals;
+          EXPECT_TRUE(mentions(e.what(), "(")) << e.what();
+        }
+      }
+  fs::remove(file);
+  EXPECT_GE(refusals, 4);  // 0.03 s holds fewer than 40 samples
+  EXPECT_GE(laws, 4);
+}
 TEST(Checks, OutsideTheWalls) {
   auto t = good();
   t.kinds["platelet"].position[1] = -3e-6;

@@ -10,6 +10,7 @@
 
 #include "calibration/diffusivity.hpp"
 #include "calibration/synthetic.hpp"
+#include "core/random.hpp"
 #include "core/statistics.hpp"
 
 namespace {
@@ -25,7 +26,22 @@ int repeats() {
 struct Scenario {
   std::string name;
   Synthetic truth;
+  int runs = 1;        ///< the platelets are spread over them
+  double scatter = 0;  ///< of D between runs, relative: cells of one box share its flow
 };
+
+std::vector<data::Trajectories> runs_of(const Scenario& scenario, int repeat) {
+  std::vector<data::Trajectories> runs;
+  for (int r = 0; r < scenario.runs; ++r) {
+    Synthetic s = scenario.truth;
+    s.seed = scenario.truth.seed + static_cast<std::uint64_t>(scenario.runs * repeat + r);
+    s.platelets = scenario.truth.platelets / scenario.runs;
+    RandomSequence random(s.seed, Stream::test);
+    s.D *= 1 + scenario.scatter * random.normal();
+    runs.push_back(generate(s));
+  }
+  return runs;
+}
 
 struct Tally {
   std::vector<double> D;
@@ -54,14 +70,13 @@ TEST_P(Coverage, RecommendedEstimateIsRightWithinItsInterval) {
   Options options;
   options.bootstrap = 200;
   for (int k = 0; k < repeats(); ++k) {
-    Synthetic s = scenario.truth;
-    s.seed = scenario.truth.seed + static_cast<std::uint64_t>(k);
-    const std::vector<data::Trajectories> runs{generate(s)};
+    const Synthetic& s = scenario.truth;
+    const std::vector<data::Trajectories> runs = runs_of(scenario, k);
     const Ensemble e = gather(runs, options);
     const Layer core = core_layer(runs, e, options);
     const Lags lags = choose_lags(e, core, options);
-    const Resampling resampling(e, options.bootstrap, s.seed);
-    const LocalFit fit = fit_local_law(e, lags.plateau, resampling, 0);
+    const Resampling resampling(e, options.bootstrap, s.seed + static_cast<std::uint64_t>(k));
+    const LocalFit fit = fit_local_law(e, lags.plateau, resampling, options.bootstrap);
     const auto all = estimators(e, core, paper_layer(runs, e), lags, resampling, fit);
     const double total = true_layer_D(s, core.low, core.high) + jump_D(s);
     for (const Estimate& x : all)
@@ -77,8 +92,9 @@ TEST_P(Coverage, RecommendedEstimateIsRightWithinItsInterval) {
   EXPECT_LT(best.coverage(), 0.73);
 }
 
-Scenario scenario(const std::string& name, std::uint64_t seed, void (*change)(Synthetic&)) {
-  Scenario s{name, {}};
+Scenario scenario(const std::string& name, std::uint64_t seed, void (*change)(Synthetic&), int runs = 1,
+                  double scatter = 0) {
+  Scenario s{name, {}, runs, scatter};
   s.truth.seed = seed;
   change(s.truth);
   return s;
@@ -91,9 +107,14 @@ INSTANTIATE_TEST_SUITE_P(
                     scenario("reflecting slab 20 um", 3000000, [](Synthetic& s) { s.gap = 20e-6; }),
                     scenario("D(y), contrast 0.5", 4000000, [](Synthetic& s) { s.D_contrast = 0.5; }),
                     scenario("persistent, 10 ms", 5000000, [](Synthetic& s) { s.memory = 10e-3; }),
-                    scenario("0.35 % jumps of 3 um", 6000000, [](Synthetic& s) {
-                      s.jump_fraction = 0.0035;
-                      s.jump_size = 3e-6;
-                    })));
+                    scenario("0.35 % jumps of 3 um", 6000000,
+                             [](Synthetic& s) {
+                               s.jump_fraction = 0.0035;
+                               s.jump_size = 3e-6;
+                             }),
+                    scenario(
+                        "3 runs, the same D", 7000000, [](Synthetic&) {}, 3),
+                    scenario(
+                        "5 runs, D scatters by 10 %", 8000000, [](Synthetic&) {}, 5, 0.1)));
 
 }  // namespace

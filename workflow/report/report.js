@@ -179,6 +179,16 @@ function literature() {
     said.map(([p, v]) => el("li", {}, (real.length > 1 ? p.label + ": " : "") + v.statement)))));
 }
 
+// The laws of all points together: trends only where they exceed their errors, and the claims stated before the data.
+function overConditions() {
+  const all = results.over_conditions;
+  if (!all) return;
+  const s = section("Does D depend on the conditions?"), tested = (all.hypotheses || []).filter(h => h.outcome !== "not tested");
+  const lines = [...tested.map(h => h.statement + " (stated before the data)"), ...(all.terms || []).map(t => t.statement),
+    ...(all.left_out || []).map(t => "left out: " + t), ...(all.warnings || [])];
+  s.append(el("div", {class: "card"}, el("ul", {class: "verdicts", style: "margin:0"}, lines.map(t => el("li", {}, t)))));
+}
+
 function localLaw() {
   const with_profile = points.map((p, i) => [p, i, (calibrationOf(p) || {}).profile]).filter(([, , q]) => q && (q.y_m || []).length);
   if (!with_profile.length) return;
@@ -292,7 +302,7 @@ function draw() {
   page.textContent = "";
   drawn.length = 0;
   document.title = (results.title || results.name || "campaign") + " · hemowalk";
-  for (const part of [headline, conditions, msdCharts, literature, localLaw, blood, coarse, diagnostics, runs, warnings, reproduce]) {
+  for (const part of [headline, conditions, msdCharts, literature, overConditions, localLaw, blood, coarse, diagnostics, runs, warnings, reproduce]) {
     try { part(); }
     catch (error) {  // one section that fails must not take the others with it, but it is said and counted
       window.pageErrors.push(part.name + ": " + error.message);
