@@ -345,6 +345,25 @@ TEST(Gate, FindsBadBookkeepingAndStress) {
   EXPECT_FALSE(find(g, "stress_uniformity")->passed);
   EXPECT_TRUE(find(g, "core_shear_over_nominal")->passed);
 }
+TEST(Gate, UnevenHalvesAreAFaultOnlyIfTheStressIsUneven) {
+  // A tenth of the wall speed more in the lower half: u = gamma y + 0.075 U sin^2 gives a spread of 0.15 U.
+  for (const double slope : {0.0, 2e3}) {
+    auto t = clean();
+    for (int j = 0; j < 10; ++j) t.profile.y.push_back((j + 0.5) * 5e-6);
+    for (const double time : {0.4, 0.5, 0.6}) {
+      t.profile.time.push_back(time);
+      for (const double y : t.profile.y) {
+        const double wave = std::sin(M_PI * y / 50e-6);
+        for (const double u : {0.0, 0.0, 100 * y + 0.075 * 5e-3 * wave * wave})
+          t.profile.velocity.push_back(u);
+        t.profile.shear_stress.push_back(0.1 + slope * y);
+      }
+    }
+    const auto g = gate_of(t);
+    EXPECT_NEAR(find(g, "velocity_antisymmetry")->value, 0.15, 0.01);
+    EXPECT_EQ(find(g, "velocity_antisymmetry")->passed, slope == 0);
+  }
+}
 TEST(Gate, FindsCellsAtOneWall) {
   auto t = clean();
   auto& p = t.kinds["platelet"].position;
