@@ -3,6 +3,7 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -103,6 +104,8 @@ struct Ranks::Impl {
     for (int idle = 0; !done(); ++idle) {
       listen();
       if (idle > 200) std::this_thread::yield();  // more processes than cores
+      if (idle > 20000)
+        std::this_thread::sleep_for(std::chrono::microseconds(50));  // one rank is at work alone
     }
   }
   void complete(MPI_Request request) {
@@ -160,8 +163,7 @@ void Ranks::max(View<double> values) const {
   impl_->complete(request);
 }
 
-std::vector<std::vector<std::byte>> Ranks::gather(const std::vector<std::byte>& mine) const {
-  if (count() == 1) return {mine};
+std::vector<std::vector<std::byte>> Ranks::gather(std::vector<std::byte> mine) const {
   std::vector<std::vector<std::byte>> all(root() ? count() : 0);
   Messages way(*this);
   if (!root()) {
@@ -169,7 +171,7 @@ std::vector<std::vector<std::byte>> Ranks::gather(const std::vector<std::byte>& 
     way.wait();
     return all;
   }
-  all[0] = mine;
+  all[0] = std::move(mine);
   for (int r = 1; r < count(); ++r) way.receive(r, gather_tag, all[r]);
   return all;
 }

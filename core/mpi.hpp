@@ -40,7 +40,7 @@ class Ranks {
   /// Largest values over the ranks (all).
   void max(View<double> values) const;
   /// Bytes of all ranks on the root, in rank order; nothing elsewhere (all).
-  std::vector<std::vector<std::byte>> gather(const std::vector<std::byte>& mine) const;
+  std::vector<std::vector<std::byte>> gather(std::vector<std::byte> mine) const;
   /// The root's parts, one per rank: each gets its own (all).
   std::vector<std::byte> scatter(const std::vector<std::vector<std::byte>>& parts) const;
   /// Bytes of the root on all ranks (all).

@@ -1,6 +1,7 @@
 #pragma once
 /// \file Arrays in a stream of bytes, each with its length before it: parts of a checkpoint.
 
+#include <cstdint>
 #include <cstring>
 #include <vector>
 
@@ -12,10 +13,10 @@ namespace hemowalk::resolved {
 template <class T>
 void put(std::vector<std::byte>& out, const T* data, std::size_t n) {
   const std::uint64_t count = n;
-  const auto* head = reinterpret_cast<const std::byte*>(&count);
-  out.insert(out.end(), head, head + sizeof(count));
-  const auto* raw = reinterpret_cast<const std::byte*>(data);
-  out.insert(out.end(), raw, raw + n * sizeof(T));
+  const std::size_t at = out.size();
+  out.resize(at + sizeof(count) + n * sizeof(T));
+  std::memcpy(out.data() + at, &count, sizeof(count));
+  if (n) std::memcpy(out.data() + at + sizeof(count), data, n * sizeof(T));
 }
 
 /// Takes arrays in the order in which they were put. \throws InputError when they are not there.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "resolved/simulation.hpp"
@@ -33,7 +34,7 @@ Gathered gather_cells(const mpi::Ranks& ranks, const Group<Real>& group, std::si
       },
       group.cells);
   std::vector<double> rows;
-  for (const auto& part : ranks.gather(mine)) {
+  for (const auto& part : ranks.gather(std::move(mine))) {
     const std::size_t at = rows.size();
     rows.resize(at + part.size() / sizeof(double));
     if (!part.empty()) std::memcpy(rows.data() + at, part.data(), part.size());

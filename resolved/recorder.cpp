@@ -6,6 +6,7 @@
 
 #include "resolved/build.hpp"
 #include "resolved/cross_section.hpp"
+#include "resolved/gather.hpp"
 #include "resolved/region.hpp"
 
 namespace hemowalk::resolved {
@@ -38,22 +39,18 @@ Recorder<Real>::Recorder(const Simulation<Real>& simulation) : planes_(simulatio
   double red_cell_volume = 0;
   for (const auto& group : simulation.groups()) {
     const data::Kind& kind = scene.cells.kinds[group.kind];
-    std::visit(
-        [&](const auto& g) {
-          if (kind.law != data::Kind::Law::rigid) {
-            if (std::isnan(record_.Ca)) {
-              const double mu = scene.fluid.density * scene.fluid.kinematic_viscosity;
-              const double shear_modulus = kind.law == data::Kind::Law::paper ? kind.B / 4 : kind.Gs;
-              record_.kappa_damping = kind.kappa_damping;
-              record_.Ca = mu * record_.shear_rate * red_cell_radius / shear_modulus;
-            }
-            red_cell_volume += g.count() * units.to_volume(g.rest_volume());
-          }
-          data::Tracks tracks;
-          for (int c = 0; c < g.count(); ++c) tracks.id.push_back(g.id(c));
-          record_.kinds[kind.name] = std::move(tracks);
-        },
-        group.cells);
+    if (kind.law != data::Kind::Law::rigid && std::isnan(record_.Ca)) {
+      const double mu = scene.fluid.density * scene.fluid.kinematic_viscosity;
+      const double shear_modulus = kind.law == data::Kind::Law::paper ? kind.B / 4 : kind.Gs;
+      record_.kappa_damping = kind.kappa_damping;
+      record_.Ca = mu * record_.shear_rate * red_cell_radius / shear_modulus;
+    }
+    data::Tracks tracks;
+    tracks.id = gather_cells(simulation.ranks(), group, 0, [](const auto&, int, double*) {}).id;
+    const double volume = std::visit([](const auto& g) { return g.rest_volume(); }, group.cells);
+    if (kind.law != data::Kind::Law::rigid)
+      red_cell_volume += static_cast<double>(tracks.id.size()) * units.to_volume(volume);
+    record_.kinds[kind.name] = std::move(tracks);
   }
   record_.hematocrit_true = red_cell_volume / Region(scene).volume();
   for (int j = 0; j < planes_; ++j) record_.profile.y.push_back((j + 0.5) * scene.fluid.dx);
@@ -70,28 +67,35 @@ void Recorder<Real>::sample(Simulation<Real>& simulation) {
 }
 
 template <class Real>
-void Recorder<Real>::sample_cells(Simulation<Real>& simulation) {
+void Recorder<Real>::sample_cells(const Simulation<Real>& simulation) {
+  static constexpr const char* names[7] = {"taylor_deformation",
+                                           "axial_diameter",
+                                           "transverse_diameter",
+                                           "inclination",
+                                           "tank_treading_angle",
+                                           "area",
+                                           "volume"};
   const LatticeUnits& units = simulation.units();
   for (const auto& group : simulation.groups()) {
     auto& tracks = record_.kinds[simulation.scene().cells.kinds[group.kind].name];
-    std::visit(
-        [&](const auto& g) {
-          std::vector<mesh::Observables> seen(g.count());
-#pragma omp parallel for schedule(static)
-          for (int c = 0; c < g.count(); ++c) seen[c] = g.observe(c);
-          for (const auto& o : seen) {
-            for (int d = 0; d < 3; ++d) tracks.position.push_back(units.to_length(o.centre[d]));
-            for (int d = 0; d < 3; ++d) tracks.orientation.push_back(o.axis[d]);
-            tracks.observables["taylor_deformation"].push_back(o.taylor_deformation);
-            tracks.observables["axial_diameter"].push_back(units.to_length(o.axial_diameter));
-            tracks.observables["transverse_diameter"].push_back(units.to_length(o.transverse_diameter));
-            tracks.observables["inclination"].push_back(o.inclination);
-            tracks.observables["tank_treading_angle"].push_back(o.tank_treading_angle);
-            tracks.observables["area"].push_back(units.to_area(o.area));
-            tracks.observables["volume"].push_back(units.to_volume(o.volume));
-          }
-        },
-        group.cells);
+    const auto seen = gather_cells(simulation.ranks(), group, 13, [&](const auto& g, int c, double* out) {
+      const mesh::Observables o = g.observe(c);
+      for (int d = 0; d < 3; ++d) out[d] = units.to_length(o.centre[d]), out[3 + d] = o.axis[d];
+      const double rest[7] = {o.taylor_deformation,
+                              units.to_length(o.axial_diameter),
+                              units.to_length(o.transverse_diameter),
+                              o.inclination,
+                              o.tank_treading_angle,
+                              units.to_area(o.area),
+                              units.to_volume(o.volume)};
+      std::copy(rest, rest + 7, out + 6);
+    });
+    for (std::size_t c = 0; c < seen.id.size(); ++c) {
+      const double* of_cell = seen.values.data() + 13 * c;
+      tracks.position.insert(tracks.position.end(), of_cell, of_cell + 3);
+      tracks.orientation.insert(tracks.orientation.end(), of_cell + 3, of_cell + 6);
+      for (int i = 0; i < 7; ++i) tracks.observables[names[i]].push_back(of_cell[6 + i]);
+    }
   }
 }
 
@@ -100,7 +104,7 @@ void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
   const LatticeUnits& units = simulation.units();
   const data::Scene& scene = simulation.scene();
   const Momentum m = simulation.momentum();
-  const lbm::Totals totals = simulation.fluid().totals();
+  const lbm::Totals totals = simulation.totals();
   const std::array<double, 3> total = m.total();
   const double scale = m.scale();
   if (!started_) {
@@ -110,11 +114,13 @@ void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
   out.time.push_back(simulation.time());
   for (int d = 0; d < 3; ++d)
     out.momentum_residual.push_back(scale > 0 ? (total[d] - momentum_start_[d]) / scale : 0);
-  out.mass_error.push_back((totals.mass - mass_start_) /
-                           static_cast<double>(simulation.fluid().fluid_nodes()));
+  double nodes = static_cast<double>(simulation.fluid().fluid_nodes());
+  simulation.ranks().sum({&nodes, 1});
+  out.mass_error.push_back((totals.mass - mass_start_) / nodes);
   double volume_error = 0;
   for (const auto& group : simulation.groups()) {
     const auto& tracks = record_.kinds[scene.cells.kinds[group.kind].name];
+    if (tracks.cells() == 0) continue;
     const auto& volume = tracks.observables.at("volume");
     const double rest = std::visit([](const auto& g) { return g.rest_volume(); }, group.cells);
     for (std::size_t c = volume.size() - tracks.cells(); c < volume.size(); ++c)
@@ -136,8 +142,9 @@ void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
       }
   out.max_speed_ratio.push_back(ratio);
   const auto& contact = simulation.contact_summary();
-  out.overlap_max.push_back(
-      units.to_length(std::max(0.0, -std::min(contact.minimum_gap, contact.minimum_wall_gap))));
+  double overlap = std::max(0.0, -std::min(contact.minimum_gap, contact.minimum_wall_gap));
+  simulation.ranks().max({&overlap, 1});
+  out.overlap_max.push_back(units.to_length(overlap));
   out.slip_rms.push_back(units.to_velocity(simulation.slip_rms()));
   out.energy_residual.push_back(nan);  // not computed
 }
@@ -147,14 +154,18 @@ void Recorder<Real>::accumulate_profile(const Simulation<Real>& simulation) {
   const Block& block = simulation.block();
   const auto planar = simulation.fluid().profiles(simulation.force());
   const auto force = simulation.force();
-  const double nodes = static_cast<double>(block.nx) * block.nz;
-  std::vector<double> area(planes_, 0.0), mean_force(planes_, 0.0);
+  const Block& whole = simulation.decomposition().whole();
+  const double nodes = static_cast<double>(whole.nx) * whole.nz,
+               share = static_cast<double>(block.nz) / whole.nz;
+  std::vector<double> area(planes_, 0.0);
+  std::vector<double> here(6 * planes_ +
+                           1);  // [plane]{velocity, stress, force, hematocrit}, force on the wall
 #pragma omp parallel for schedule(static)
   for (int j = 0; j < planes_; ++j) {
     double sum = 0;
     for (int k = 0; k < block.nz; ++k)
       for (int i = 0; i < block.nx; ++i) sum += force[block.at(i, j, k)].z;
-    mean_force[j] = sum / nodes;
+    here[6 * j + 4] = sum / nodes;
   }
   for (const auto& group : simulation.groups()) {
     const data::Kind& kind = simulation.scene().cells.kinds[group.kind];
@@ -169,12 +180,19 @@ void Recorder<Real>::accumulate_profile(const Simulation<Real>& simulation) {
         group.cells);
   }
   for (int j = 0; j < planes_; ++j) {
-    for (int d = 0; d < 3; ++d) velocity_sum_[3 * j + d] += planar.velocity[j][d];
-    fluid_stress_sum_[j] += planar.shear_yz[j];
-    hematocrit_sum_[j] += area[j] / nodes;
-    force_sum_[j] += mean_force[j];
+    for (int d = 0; d < 3; ++d) here[6 * j + d] = share * planar.velocity[j][d];
+    here[6 * j + 3] = share * planar.shear_yz[j];
+    here[6 * j + 5] = area[j] / nodes;
   }
-  wall_force_sum_ += simulation.force_on_walls()[0][2] / nodes;
+  here.back() = simulation.force_on_walls()[0][2] / nodes;
+  simulation.ranks().sum({here.data(), here.size()});
+  for (int j = 0; j < planes_; ++j) {
+    for (int d = 0; d < 3; ++d) velocity_sum_[3 * j + d] += here[6 * j + d];
+    fluid_stress_sum_[j] += here[6 * j + 3];
+    force_sum_[j] += here[6 * j + 4];
+    hematocrit_sum_[j] += here[6 * j + 5];
+  }
+  wall_force_sum_ += here.back();
   ++averaged_;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-/// \file Recorder: samples a running simulation into a data::Trajectories, in physical units.
+/// \file Recorder: samples a running simulation into a data::Trajectories, in physical units. All ranks call
+/// it, the root's record is complete: cells in the order of their ids. Elsewhere it holds no cells.
 
 #include <vector>
 
@@ -29,7 +30,7 @@ class Recorder {
   void load(const std::vector<double>& state);
 
  private:
-  void sample_cells(Simulation<Real>& simulation);
+  void sample_cells(const Simulation<Real>& simulation);
   void sample_diagnostics(Simulation<Real>& simulation);
 
   data::Trajectories record_;

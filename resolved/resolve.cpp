@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 
@@ -14,7 +15,9 @@
 #include "core/data/trajectories.hpp"
 #include "core/log.hpp"
 #include "core/provenance.hpp"
+#include "resolved/bytes.hpp"
 #include "resolved/checkpoint.hpp"
+#include "resolved/gather.hpp"
 #include "resolved/packing.hpp"
 #include "resolved/recorder.hpp"
 #include "resolved/simulation.hpp"
@@ -55,7 +58,7 @@ class Run {
   Run(const Scene& scene, const RunOptions& options, const std::vector<InitialCell>& cells)
       : scene_(scene),
         options_(options),
-        simulation_(scene, cells),
+        simulation_(scene, cells, options.ranks),
         recorder_(simulation_),
         schedule_(scene, simulation_.units()) {
     recorder_.trajectories().version = version();
@@ -64,17 +67,20 @@ class Run {
   RunSummary go() {
     const double start = omp_get_wtime();
     const std::int64_t first = resume();
-    if (schedule_.surface > 0) surfaces_ = make_surfaces();
+    if (schedule_.surface > 0 && root()) surfaces_ = make_surfaces();
     if (first == 0) outputs(0);
     double last_checkpoint = omp_get_wtime();
+    mpi::Agreement agreement(options_.ranks);
     while (simulation_.fluid_steps() < schedule_.end) {
       simulation_.step();
       const std::int64_t step = simulation_.fluid_steps();
       outputs(step);
-      const bool stop = options_.stop_requested && options_.stop_requested();
-      const bool by_clock =
-          scene_.time.checkpoint_wall > 0 && omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
-      if (stop || by_clock || due(step, schedule_.checkpoint)) {
+      const bool by_clock = root() && scene_.time.checkpoint_wall > 0 &&
+                            omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
+      const bool asked = options_.stop_requested && options_.stop_requested();
+      const unsigned agreed = agreement.any((asked ? stop_flag : 0) | (by_clock ? checkpoint_flag : 0));
+      const bool stop = agreed & stop_flag;
+      if (agreed || due(step, schedule_.checkpoint)) {
         checkpoint();
         last_checkpoint = omp_get_wtime();
       }
@@ -82,12 +88,17 @@ class Run {
         throw Interrupted(fmt::format("stopped at {:.4g} s of {:.4g} s with a checkpoint", simulation_.time(),
                                       scene_.time.end));
     }
-    data::write_trajectories(recorder_.trajectories(), options_.out + "/trajectories.h5");
-    fs::remove_all(folder());
+    options_.ranks.on_root([&] {
+      data::write_trajectories(recorder_.trajectories(), options_.out + "/trajectories.h5");
+      fs::remove_all(folder());
+    });
     return summary(omp_get_wtime() - start);
   }
 
  private:
+  static constexpr unsigned stop_flag = 1, checkpoint_flag = 2;
+
+  bool root() const { return options_.ranks.root(); }
   std::string folder() const { return options_.out + "/checkpoint"; }
 
   std::unique_ptr<SurfaceOutput> make_surfaces() const {
@@ -95,8 +106,9 @@ class Run {
     for (const auto& group : simulation_.groups())
       std::visit(
           [&](const auto& g) {
-            kinds.push_back(
-                {scene_.cells.kinds[group.kind].name, g.rest().triangles, g.vertices(), g.count()});
+            const std::string& name = scene_.cells.kinds[group.kind].name;
+            const auto cells = recorder_.trajectories().kinds.at(name).cells();
+            kinds.push_back({name, g.rest().triangles, g.vertices(), static_cast<int>(cells)});
           },
           group.cells);
     return std::make_unique<SurfaceOutput>(options_.out, std::move(kinds),
@@ -105,16 +117,17 @@ class Run {
 
   void write_surfaces() {
     std::vector<double> position;
-    position.reserve(surfaces_->position_size());
-    for (const auto& group : simulation_.groups())
-      std::visit(
-          [&](const auto& g) {
-            for (int c = 0; c < g.count(); ++c)
-              for (const auto& x : g.positions(c))
-                for (int d = 0; d < 3; ++d) position.push_back(simulation_.units().to_length(x[d]));
-          },
-          group.cells);
-    surfaces_->append(simulation_.time(), position);
+    for (const auto& group : simulation_.groups()) {
+      const int vertices = std::visit([](const auto& g) { return g.vertices(); }, group.cells);
+      const auto all = gather_cells(options_.ranks, group, 3 * static_cast<std::size_t>(vertices),
+                                    [&](const auto& g, int c, double* out) {
+                                      for (const auto& x : g.positions(c))
+                                        for (int d = 0; d < 3; ++d)
+                                          *out++ = simulation_.units().to_length(x[d]);
+                                    });
+      position.insert(position.end(), all.values.begin(), all.values.end());
+    }
+    if (root()) surfaces_->append(simulation_.time(), position);
   }
 
   void outputs(std::int64_t step) {
@@ -123,6 +136,7 @@ class Run {
     if (due(step, schedule_.surface)) write_surfaces();
     if (!due(step, schedule_.sample)) return;
     recorder_.sample(simulation_);
+    if (!root()) return;
     guard();
     if (options_.progress)
       options_.progress(static_cast<double>(step) / static_cast<double>(schedule_.end), state_line());
@@ -157,34 +171,65 @@ class Run {
                        1e6 * d.overlap_max.back());
   }
 
+  /// One file, written by the root: it needs memory for the state of all ranks.
   void checkpoint() {
-    fs::create_directories(folder());
-    data::write_trajectories(recorder_.trajectories(), folder() + "/trajectories.h5");
-    const auto& t = recorder_.trajectories();
-    Checkpoint c{scene_.input_sha256, version(), simulation_.save(), recorder_.save()};
-    c.recorder.insert(c.recorder.end(),
-                      {static_cast<double>(t.time.size()), static_cast<double>(t.profile.time.size()),
-                       static_cast<double>(t.diagnostics.time.size())});
-    write_checkpoint(c, folder() + "/state.bin");
+    auto parts = options_.ranks.gather(simulation_.save());
+    options_.ranks.on_root([&] {
+      fs::create_directories(folder());
+      data::write_trajectories(recorder_.trajectories(), folder() + "/trajectories.h5");
+      const auto& t = recorder_.trajectories();
+      Checkpoint c{scene_.input_sha256, version(), {}, recorder_.save()};
+      std::size_t bytes = 0;
+      for (const auto& part : parts) bytes += sizeof(std::uint64_t) + part.size();
+      c.solver.reserve(bytes);
+      for (auto& part : parts) {
+        put(c.solver, part.data(), part.size());
+        part = {};
+      }
+      c.recorder.insert(c.recorder.end(),
+                        {static_cast<double>(t.time.size()), static_cast<double>(t.profile.time.size()),
+                         static_cast<double>(t.diagnostics.time.size())});
+      write_checkpoint(c, folder() + "/state.bin");
+    });
   }
 
   /// \returns the step to go on from, 0 for a fresh start.
   std::int64_t resume() {
+    std::vector<std::vector<std::byte>> parts;
+    std::vector<std::byte> recorder;
+    options_.ranks.on_root([&] { read_state(parts, recorder); });
+    options_.ranks.broadcast(recorder);
+    if (recorder.empty()) return 0;
+    const auto mine = options_.ranks.scatter(parts);
+    simulation_.load({mine.data(), mine.size()});
+    std::vector<double> sums(recorder.size() / sizeof(double));
+    std::memcpy(sums.data(), recorder.data(), recorder.size());
+    recorder_.load(sums);
+    return simulation_.fluid_steps();
+  }
+
+  /// The checkpoint, cut for the ranks there are; nothing if there is none.
+  void read_state(std::vector<std::vector<std::byte>>& parts, std::vector<std::byte>& recorder) {
     const std::string state = folder() + "/state.bin";
-    if (!options_.resume || !fs::exists(state)) return 0;
+    if (!options_.resume || !fs::exists(state)) return;
     Checkpoint c = read_checkpoint(state);
     require(c.input_sha256 == scene_.input_sha256,
             state + " belongs to another scene (the hashes of the inputs differ) remove it to start afresh");
     require(c.recorder.size() > 3, state + " is damaged (no record sizes) remove it to start afresh");
-    simulation_.load({c.solver.data(), c.solver.size()});
+    for (Reader in({c.solver.data(), c.solver.size()}); !in.at_end();) parts.push_back(in.take<std::byte>());
+    if (static_cast<int>(parts.size()) != options_.ranks.count()) {
+      log_info(fmt::format("the checkpoint was made on {} ranks: cut for {}", parts.size(),
+                           options_.ranks.count()));
+      parts = redistribute<Real>(parts, simulation_.decomposition().whole(), options_.ranks.count());
+    }
     recorder_.trajectories() = data::read_trajectories(folder() + "/trajectories.h5");
     const auto size = [&](int from_end) {
       return static_cast<std::size_t>(c.recorder[c.recorder.size() - from_end]);
     };
     truncate(recorder_.trajectories(), size(3), size(2), size(1));
     c.recorder.resize(c.recorder.size() - 3);
-    recorder_.load(c.recorder);
-    return simulation_.fluid_steps();
+    recorder.resize(c.recorder.size() * sizeof(double));
+    std::memcpy(recorder.data(), c.recorder.data(), recorder.size());
   }
 
   /// The record may be newer than the state when a run was killed between the two files: drop the surplus.
@@ -226,6 +271,25 @@ class Run {
   std::unique_ptr<SurfaceOutput> surfaces_;
 };
 
+/// The root's cells on all ranks.
+void share_cells(const mpi::Ranks& ranks, std::vector<InitialCell>& cells) {
+  if (ranks.count() == 1) return;
+  std::vector<std::byte> bytes;
+  if (ranks.root())
+    for (const InitialCell& c : cells) {
+      put(bytes, &c.kind, 1), put(bytes, c.centre.data(), 3);
+      put(bytes, &c.orientation, 1), put(bytes, c.vertices.data(), c.vertices.size());
+    }
+  ranks.broadcast(bytes);
+  cells.clear();
+  for (Reader in({bytes.data(), bytes.size()}); !in.at_end();) {
+    InitialCell& c = cells.emplace_back();
+    in.into(&c.kind, 1), in.into(c.centre.data(), 3);
+    in.into(&c.orientation, 1);
+    c.vertices = in.take<mesh::Vec3>();
+  }
+}
+
 }  // namespace
 
 RunSummary resolve(const Scene& scene, const RunOptions& options) {
@@ -235,11 +299,20 @@ RunSummary resolve(const Scene& scene, const RunOptions& options) {
     for (const auto& p : problems) all += (all.empty() ? "" : "\n") + p;
     throw InputError(all);
   }
-  const std::vector<InitialCell> cells = pack(scene);
-  fs::create_directories(options.out);
-  if (scene.fluid.precision == data::Fluid::Precision::double_)
-    return Run<double>(scene, options, cells).go();
-  return Run<float>(scene, options, cells).go();
+  RunSummary summary;
+  options.ranks.guarded([&] {
+    // Packing is not divided: the root packs, and all get the same cells.
+    std::vector<InitialCell> cells;
+    options.ranks.on_root([&] {
+      cells = pack(scene);
+      fs::create_directories(options.out);
+    });
+    share_cells(options.ranks, cells);
+    summary = scene.fluid.precision == data::Fluid::Precision::double_
+                  ? Run<double>(scene, options, cells).go()
+                  : Run<float>(scene, options, cells).go();
+  });
+  return summary;
 }
 
 }  // namespace hemowalk::resolved

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/data/scene.hpp"
+#include "core/mpi.hpp"
 
 namespace hemowalk::resolved {
 
@@ -13,7 +14,11 @@ struct RunOptions {
   std::string out;      ///< run folder: trajectories.h5, cells.xdmf, checkpoint/
   bool resume = false;  ///< continue from out/checkpoint if there is one
   std::function<void(double, const std::string&)> progress;  ///< fraction done, one line of state
-  std::function<bool()> stop_requested;                      ///< polled; true -> checkpoint, then Interrupted
+  /// Polled; true on any rank -> checkpoint, then Interrupted on all.
+  std::function<bool()> stop_requested;
+  /// Who takes part: each calls resolve() with the same scene. Only the root writes files and reports
+  /// progress.
+  mpi::Ranks ranks;
 };
 
 struct RunSummary {
@@ -23,7 +28,9 @@ struct RunSummary {
   double hematocrit_true = 0;
 };
 
-/// Simulates \p scene. \throws InputError, PhysicsError (naming cell and step), Interrupted, IoError.
+/// Simulates \p scene. \throws InputError, PhysicsError (naming cell and step), Interrupted, IoError; an
+/// error on one rank is thrown, as an Error of the same code and text, on all. The summary's counts are the
+/// root's.
 RunSummary resolve(const data::Scene& scene, const RunOptions& options);
 
 /// Cell numbers of a scene before it runs: n_RBC = floor(Ht V_box/V_RBC), n_PLT = floor(n_RBC * ratio).

@@ -168,7 +168,7 @@ void Simulation<Real>::read_positions() {
         group.cells);
 }
 
-/// Retraction as a change of coordinates (docs/adr/0007): the coupling point x_s = x - delta n(x) is a
+/// Retraction as a change of coordinates (docs/adr/0008): the coupling point x_s = x - delta n(x) is a
 /// function of the vertices, so its velocity is v - delta dn/dt, and a force J at x_s acts on the vertices as
 /// J and, through -delta (dn/dx)^T, as forces on the corners of the triangles around. Virtual work and both
 /// momenta are then conserved, and a rigid rotation of fluid and cell together feels no force. dn/dt and J
@@ -312,6 +312,15 @@ void Simulation<Real>::impulses() {
 /// changed.
 template <class Real>
 void Simulation<Real>::share_positions() {
+  for (const auto& group : groups_)
+    for (int c = 0; c < group.count() && decomposition_.divided(); ++c) {
+      const Extent& e = extent_[group.first_body + c];
+      if (e.high - e.low < decomposition_.whole().nz) continue;
+      const auto id = std::visit([&](const auto& g) { return g.id(c); }, group.cells);
+      throw PhysicsError("cell " + std::to_string(id) + " (" + scene_.cells.kinds[group.kind].name +
+                         ") is longer than the box at step " + std::to_string(fluid_steps_) +
+                         " (blow-up) lower the acceleration or raise coupling.iterations");
+    }
   const auto change =
       copies_->exchange({extent_.data(), bodies_}, origin_.view(), vertices_.view(), sites_.view());
   if (change.markers) {

@@ -4,7 +4,7 @@ if(TARGET hemowalk_resolved)
             verification/test_resolved_tube.cpp
     LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
-  add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_resolved_ranks.cpp)
+  add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)
   target_link_libraries(test_resolved_ranks PRIVATE hemowalk_resolved GTest::gtest)
   target_include_directories(test_resolved_ranks PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   add_test(NAME test_resolved_ranks COMMAND ${MPIEXEC_EXECUTABLE} -n 3 --bind-to none $<TARGET_FILE:test_resolved_ranks>)

@@ -11,6 +11,9 @@ if(TARGET hemowalk)
     add_test(NAME ${test} COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/integration/${test}.sh $<TARGET_FILE:hemowalk>)
     set_tests_properties(${test} PROPERTIES LABELS integration TIMEOUT 600)
   endforeach()
+  add_test(NAME test_cli_ranks COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/integration/test_cli_ranks.sh $<TARGET_FILE:hemowalk>
+    ${MPIEXEC_EXECUTABLE})
+  set_tests_properties(test_cli_ranks PROPERTIES LABELS integration TIMEOUT 600)
   # Kills and resumes real runs: minutes on a busy machine.
   add_test(NAME test_cli_resolved COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/integration/test_cli_resolved.sh $<TARGET_FILE:hemowalk>)
   set_tests_properties(test_cli_resolved PROPERTIES LABELS validation TIMEOUT 900)

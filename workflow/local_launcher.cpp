@@ -33,15 +33,17 @@ struct Active {
 };
 
 /// What the child left behind, put right where it could not write its own end.
-Status last_status(const Active& run, const Ending& ending, const std::string& folder, double time_limit) {
+Status last_status(const Active& run, const Ending& ending, const std::string& folder, double time_limit,
+                   int stop_signal) {
   Status status = read_status(folder).value_or(Status{});
   const bool child_said_so = status.state != State::running && status.state != State::queued;
   if (run.out_of_time) {
     status.state = State::timed_out;
     status.reason = "over the time limit of " + format_duration(time_limit);
   } else if (ending.signal || !child_said_so) {
-    const bool stopped = ending.exit_code == static_cast<int>(Exit::interrupted) ||
-                         (run.told_to_stop && ending.signal == SIGTERM);
+    const bool stopped =
+        ending.exit_code == static_cast<int>(Exit::interrupted) ||
+        (run.told_to_stop && (ending.signal == stop_signal || ending.exit_code == 128 + stop_signal));
     status.state = stopped ? State::interrupted : State::failed;
     status.reason = describe(ending) + ", see log.txt";
   }
@@ -70,7 +72,10 @@ class Pool {
       total_cost_ += jobs[j].cost;
     }
     const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-    threads_ = options.threads > 0 ? options.threads : std::max(1, cores / std::max(1, options.slots));
+    threads_ = options.threads > 0
+                   ? options.threads
+                   : std::max(1, cores / (std::max(1, options.slots) * std::max(1, options.ranks)));
+    if (options.ranks > 1) launcher_ = mpirun(cores);
   }
 
   std::vector<Status> run() {
@@ -98,10 +103,32 @@ class Pool {
     int tries;
   };
 
+  /// How runs of several ranks start. Each rank gets cores of its own where they suffice; runs side by side
+  /// would all be bound to the first cores, so they are left to the system.
+  std::vector<std::string> mpirun(int cores) const {
+    const auto program = find_program("mpirun");
+    require(program.has_value(),
+            "launcher.ranks is " + std::to_string(options_.ranks) +
+                " and there is no mpirun (runs of several ranks start through it) install "
+                "Open MPI, or use launcher.ranks: 1");
+    std::vector<std::string> words{*program, "--quiet", "-n", std::to_string(options_.ranks)};
+    const bool own_cores = options_.slots <= 1 && options_.ranks * threads_ <= cores;
+    const std::vector<std::string> binding =
+        own_cores
+            ? std::vector<std::string>{"--map-by", "slot:PE=" + std::to_string(threads_), "--bind-to", "core"}
+            : std::vector<std::string>{"--bind-to", "none"};
+    words.insert(words.end(), binding.begin(), binding.end());
+    // After SIGTERM Open MPI kills within a second: ranks need time for their checkpoint.
+    words.insert(words.end(), {"--mca", "odls_base_sigkill_timeout", "600"});
+    return words;
+  }
+  /// mpirun passes SIGUSR1 on to all ranks and lives on, where SIGTERM ends it.
+  int stop_signal() const { return launcher_.empty() ? SIGTERM : SIGUSR1; }
+
   void stop_children() {
     for (auto& a : active_) {
       a.told_to_stop = true;
-      a.child->signal(SIGTERM);
+      a.child->signal(stop_signal());
     }
   }
 
@@ -109,12 +136,14 @@ class Pool {
     const auto [j, tries] = waiting_.front();
     waiting_.pop_front();
     const Job& job = jobs_[j];
-    const std::vector<std::string> arguments{this_program(), "resolve",  job.folder + "/scene.yaml",
-                                             "--out",        job.folder, "--resume"};
+    std::vector<std::string> arguments = launcher_;
+    arguments.insert(arguments.end(), {this_program(), "resolve", job.folder + "/scene.yaml", "--out",
+                                       job.folder, "--resume"});
     active_.push_back({j, clock::now(),
                        std::make_unique<Child>(
                            arguments, job.folder + "/log.txt",
-                           std::map<std::string, std::string>{{"OMP_NUM_THREADS", std::to_string(threads_)}}),
+                           std::map<std::string, std::string>{{"OMP_NUM_THREADS", std::to_string(threads_)}},
+                           stop_signal()),
                        tries + 1});
   }
 
@@ -122,7 +151,7 @@ class Pool {
     Active& run = active_[k];
     const Job& job = jobs_[run.job];
     if (const auto ending = run.child->poll()) {
-      status_[run.job] = last_status(run, *ending, job.folder, options_.time_limit);
+      status_[run.job] = last_status(run, *ending, job.folder, options_.time_limit, stop_signal());
       const Status status = status_[run.job];
       const int tries = run.tries;
       const std::size_t j = run.job;
@@ -132,7 +161,7 @@ class Pool {
     }
     if (options_.time_limit > 0 && !run.out_of_time && seconds_since(run.started) > options_.time_limit) {
       run.out_of_time = true;
-      run.child->signal(SIGTERM);
+      run.child->signal(stop_signal());
     }
   }
 
@@ -180,6 +209,7 @@ class Pool {
   std::vector<double> done_;
   double total_cost_ = 0;
   int threads_ = 1;
+  std::vector<std::string> launcher_;  ///< words before the program's; none on one rank
   bool stopping_ = false;
   Progress progress_;
 };

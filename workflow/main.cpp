@@ -9,6 +9,7 @@
 
 #include "core/check.hpp"
 #include "core/log.hpp"
+#include "core/mpi.hpp"
 #include "core/provenance.hpp"
 #include "core/yaml/document.hpp"
 #include "workflow/command.hpp"
@@ -40,6 +41,7 @@ void check_verb(const CLI::App& program, const std::string& word) {
 
 /// The last word on an error: readable on stderr, and the one JSON object if that was asked for.
 int fail(const Session& session, bool json, int code, const std::string& message) {
+  if (mpi::world_rank() != 0) return code;  // the root says it, once
   log_error(message);
   if (json) {
     auto object = json_head(session.verb.empty() ? "error" : session.verb, "", std::nullopt);
@@ -108,4 +110,8 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace hemowalk::workflow
 
-int main(int argc, char** argv) { return hemowalk::workflow::run(argc, argv); }
+int main(int argc, char** argv) {
+  const int code = hemowalk::workflow::run(argc, argv);
+  hemowalk::mpi::finish();
+  return code;
+}

@@ -108,6 +108,7 @@ class Pipeline {
       log_info(fmt::format("{} of {} runs are done already", summary_.cached, plan_.runs.size()));
     LaunchOptions launch;
     launch.slots = campaign_.launcher.slots;
+    launch.ranks = campaign_.launcher.ranks;
     launch.threads = campaign_.launcher.threads;
     launch.on_failure = static_cast<OnFailure>(campaign_.on_failure.action);
     launch.attempts = campaign_.on_failure.attempts;

@@ -7,8 +7,10 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <sstream>
 
 #include "core/check.hpp"
 
@@ -25,12 +27,19 @@ void on_stop(int number) {
   stop_flag = 1;
 }
 
+/// Set by a launcher for the process it started, which its children are not.
+bool of_launcher(const std::string& key) {
+  return key.starts_with("OMPI_COMM_WORLD_") || key == "PMIX_RANK" || key == "PMIX_NAMESPACE" ||
+         key == "PMI_RANK" || key == "PMI_SIZE";
+}
+
 /// This process's environment with \p changes applied, as KEY=VALUE texts.
 std::vector<std::string> environment_with(const std::map<std::string, std::string>& changes) {
   std::vector<std::string> result;
   for (char** entry = environ; *entry; ++entry) {
     const std::string text = *entry;
-    if (!changes.count(text.substr(0, text.find('=')))) result.push_back(text);
+    const std::string key = text.substr(0, text.find('='));
+    if (!changes.count(key) && !of_launcher(key)) result.push_back(text);
   }
   for (const auto& [key, value] : changes) result.push_back(key + "=" + value);
   return result;
@@ -46,7 +55,7 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 }  // namespace
 
 Child::Child(const std::vector<std::string>& arguments, const std::string& log_file,
-             const std::map<std::string, std::string>& environment) {
+             const std::map<std::string, std::string>& environment, int at_parents_death) {
   // Everything that allocates happens before fork(): the child may only make async-signal-safe calls.
   auto argument_texts = arguments;
   auto environment_texts = environment_with(environment);
@@ -58,7 +67,7 @@ Child::Child(const std::vector<std::string>& arguments, const std::string& log_f
   const pid_t parent = getpid();
   pid_ = fork();
   if (pid_ == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    prctl(PR_SET_PDEATHSIG, at_parents_death);
     if (getppid() != parent) _exit(75);
     setpgid(0, 0);  // Ctrl-C goes to the driver, which stops its children in order
     const int nothing = open("/dev/null", O_RDONLY);
@@ -100,6 +109,14 @@ std::string describe(const Ending& ending) {
   if (ending.signal)
     return "killed by signal " + std::to_string(*ending.signal) + " (" + strsignal(*ending.signal) + ")";
   return "exit code " + std::to_string(ending.exit_code.value_or(-1));
+}
+
+std::optional<std::string> find_program(const std::string& name) {
+  const char* path = std::getenv("PATH");
+  std::stringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (const std::string file = folder + "/" + name; access(file.c_str(), X_OK) == 0) return file;
+  return std::nullopt;
 }
 
 std::string this_program() { return std::filesystem::read_symlink("/proc/self/exe").string(); }

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <csignal>
 #include <map>
 #include <optional>
 #include <string>
@@ -16,14 +17,15 @@ struct Ending {
   std::optional<int> signal;
 };
 
-/// A running child of this process. It gets SIGTERM when this process dies, so that it can write a
+/// A running child of this process. It gets a signal when this process dies, so that it can write a
 /// checkpoint.
 class Child {
  public:
   /// Starts \p arguments[0] with stdout and stderr appended to \p log_file, in this process's environment
-  /// with \p environment on top. \throws IoError
+  /// with \p environment on top, and without what says that mpirun or srun started this process.
+  /// \param at_parents_death signal. \throws IoError
   Child(const std::vector<std::string>& arguments, const std::string& log_file,
-        const std::map<std::string, std::string>& environment = {});
+        const std::map<std::string, std::string>& environment = {}, int at_parents_death = SIGTERM);
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
   /// Kills a child that is still there and waits for it.
@@ -41,6 +43,9 @@ class Child {
 
 /// "exit code 3", "killed by signal 11 (Segmentation fault)".
 std::string describe(const Ending& ending);
+
+/// Path of a program that the user could start by its name.
+std::optional<std::string> find_program(const std::string& name);
 
 /// Path of the running program.
 std::string this_program();

@@ -3,12 +3,16 @@
 // are cut from them.
 
 #include <omp.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "core/check.hpp"
+#include "core/data/trajectories.hpp"
 #include "ranks/ranks_main.hpp"
 #include "resolved/gather.hpp"
+#include "resolved/resolve.hpp"
 #include "resolved/simulation.hpp"
 
 namespace hemowalk::resolved {
@@ -117,7 +121,224 @@ void expect_agreement(const data::Scene& scene, int steps, double relative) {
     });
 }
 
+// Round-off of sums in another order, 1e-16, through a hundred steps of contact and membranes (it grows
+// tenfold in some 30 steps at most).
 TEST(RanksOfTheSolver, AgreeInDoubleOverHundredSteps) { expect_agreement<double>(long_scene(), 100, 1e-10); }
+
+TEST(RanksOfTheSolver, AgreeWithTwoSlipFactorsAndPointLoads) {
+  data::Scene scene = long_scene();
+  scene.coupling.theta_t = 0.8;  // two fields are read, hence exchanged
+  scene.cells.loads = {{2, "+z", 0.05, {0, 0, 20e-12}}, {2, "-z", 0.05, {0, 0, -20e-12}}};
+  expect_agreement<double>(scene, 60, 1e-10);
+}
+
+// The same with a round-off of 6e-8.
+TEST(RanksOfTheSolver, AgreeInSingle) { expect_agreement<float>(long_scene(), 100, 1e-3); }
+
+// Both walls push the crowd for 300 steps; every pair of contacts and every kernel across a border is booked.
+template <class Real>
+void expect_momentum_to_close(double relative) {
+  for (const int n : {2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      data::Scene scene = long_scene();
+      scene.cells.loads = {{0, "+x", 0.1, {10e-12, 0, 0}}};
+      Simulation<Real> sim(scene, crowd(), ranks);
+      const auto start = sim.momentum().fluid;
+      for (int i = 0; i < 300; ++i) sim.step();
+      const Momentum m = sim.momentum();
+      const double scale = std::abs(m.to_upper_wall[2]);
+      EXPECT_GT(scale, 1);
+      EXPECT_GT(m.from_loads[0], 0);
+      for (int d = 0; d < 3; ++d)
+        EXPECT_LT(std::abs(m.fluid[d] + m.cells[d] + m.to_lower_wall[d] + m.to_upper_wall[d] -
+                           m.from_loads[d] - start[d]),
+                  relative * scale)
+            << "component " << d << ", " << n << " ranks";
+    });
+}
+TEST(RanksOfTheSolver, MomentumClosesInDouble) { expect_momentum_to_close<double>(1e-12); }
+TEST(RanksOfTheSolver, MomentumClosesInSingle) { expect_momentum_to_close<float>(1e-5); }
+
+/// A platelet near a wall that moves by a tenth of a node per step, behind it a red cell.
+data::Scene fast_scene() {
+  data::Scene scene = long_scene(285);
+  scene.cells.kinds[0].kappa_damping = 0;
+  return scene;
+}
+std::vector<InitialCell> travellers() {
+  return {{1, {12, 24.5, 15}, mesh::rotation({0, 0, 1}, 0.1), {}},
+          {0, {12, 19.5, 55}, mesh::rotation({0, 0, 1}, 0.1), {}}};
+}
+
+// Once through all slabs and the periodic border: every rank has had the cells, none was lost or doubled.
+TEST(RanksOfTheSolver, CellsTravelThroughAllSlabs) {
+  std::vector<double> one, fluid;
+  double scale = 0;
+  for (const int n : {1, 2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      Simulation<double> sim(fast_scene(), travellers(), ranks);
+      const auto start = whole(sim).position;
+      for (int i = 0; i < 760; ++i) {
+        sim.step();
+        if (i % 100 != 0) continue;
+        double cells = sim.bodies();
+        ranks.sum({&cells, 1});
+        ASSERT_EQ(cells, 2);
+      }
+      const Whole end = whole(sim);
+      if (n > 1) {
+        EXPECT_GE(sim.arrivals(), n == 3 ? 1 : 2) << "rank " << ranks.rank() << " of " << n;
+      }
+      if (!ranks.root()) return;
+      if (n == 1) {
+        one = end.position, fluid = end.velocity, scale = end.largest_speed;
+        EXPECT_GT(largest_difference(one, start), 60) << "once round the box";
+        return;
+      }
+      // 760 steps of one smooth motion; coordinates of some 100 with a round-off of 1e-14.
+      EXPECT_LT(largest_difference(end.position, one), 1e-9) << n << " ranks";
+      EXPECT_LT(largest_difference(end.velocity, fluid), 1e-10 * scale) << n << " ranks";
+    });
+}
+
+TEST(RanksOfTheSolver, ThreadsChangeNoBit) {
+  for (const int n : {2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      std::vector<std::byte> first;
+      for (const int threads : {1, 2, 3}) {
+        omp_set_num_threads(threads);
+        Simulation<float> sim(long_scene(100), crowd(), ranks);
+        for (int i = 0; i < 40; ++i) sim.step();
+        const auto state = sim.save();
+        if (first.empty()) first = state;
+        EXPECT_TRUE(first == state) << threads << " threads, rank " << ranks.rank() << " of " << n;
+      }
+      omp_set_num_threads(1);
+    });
+}
+
+// The state is taken in every step of a stretch in which cells pass from rank to rank.
+TEST(RanksOfTheSolver, RestartOnAsManyRanksChangesNoBit) {
+  for (const int n : {2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      Simulation<float> sim(fast_scene(), travellers(), ranks);
+      std::vector<std::vector<std::byte>> middle;
+      std::int64_t before = 0;
+      for (int i = 0; i < 120; ++i) {
+        if (i >= 60 && i % 7 == 0) middle.push_back(sim.save());
+        if (i == 60) before = sim.arrivals();
+        sim.step();
+      }
+      double arrivals = static_cast<double>(sim.arrivals() - before);
+      ranks.sum({&arrivals, 1});
+      EXPECT_GT(arrivals, 0) << "the stretch should see a cell pass";
+      const auto end = sim.save();
+      for (std::size_t s = 0; s < middle.size(); ++s) {
+        Simulation<float> again(fast_scene(), travellers(), ranks);
+        again.load({middle[s].data(), middle[s].size()});
+        while (again.fluid_steps() < sim.fluid_steps()) again.step();
+        EXPECT_TRUE(again.save() == end) << "state " << s << ", rank " << ranks.rank() << " of " << n;
+      }
+    });
+}
+
+// States of three, two and one rank go on as each other's, up to the order of sums.
+TEST(RanksOfTheSolver, RestartOnOtherRanksIsTheSameRun) {
+  std::vector<std::vector<std::byte>> parts[3];
+  std::vector<Whole> ends(3);
+  for (const int n : {1, 2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      Simulation<double> sim(long_scene(), crowd(), ranks);
+      for (int i = 0; i < 31; ++i) sim.step();
+      parts[n - 1] = ranks.gather(sim.save());
+      for (int i = 0; i < 30; ++i) sim.step();
+      ends[n - 1] = whole(sim);
+    });
+  for (const auto& [from, to] : {std::pair{1, 3}, {3, 2}, {2, 1}, {1, 2}, {3, 1}})
+    on(to, [&, from = from, to = to](const mpi::Ranks& ranks) {
+      Simulation<double> sim(long_scene(), crowd(), ranks);
+      std::vector<std::vector<std::byte>> cut;
+      if (ranks.root()) cut = redistribute<double>(parts[from - 1], sim.decomposition().whole(), to);
+      const auto mine = ranks.scatter(cut);
+      sim.load({mine.data(), mine.size()});
+      EXPECT_EQ(sim.fluid_steps(), 31);
+      for (int i = 0; i < 30; ++i) sim.step();
+      const Whole end = whole(sim);
+      if (!ranks.root()) return;
+      const Whole& same = ends[from - 1];
+      EXPECT_LT(largest_difference(end.velocity, same.velocity), 1e-10 * same.largest_speed)
+          << from << " to " << to;
+      EXPECT_LT(largest_difference(end.position, same.position), 1e-11) << from << " to " << to;
+    });
+}
+
+// A whole run, packing and files included: the records of the root.
+TEST(RanksOfTheSolver, RunsWriteTheSameRecord) {
+  data::Scene scene = long_scene(50);
+  scene.cells.hematocrit = 0.1;
+  scene.cells.platelets_per_rbc = 1;
+  scene.fluid.precision = data::Fluid::Precision::double_;
+  scene.time.end = 0.5e-3, scene.time.sample = 0.1e-3, scene.time.profile = 0.25e-3;
+  scene.time.checkpoint_wall = 0;
+  scene.time.checkpoint_every = 0.2e-3;
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("hemowalk_ranks_" + std::to_string(getppid()));
+  data::Trajectories one;
+  for (const int n : {1, 2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      RunOptions options;
+      options.out = folder / std::to_string(n);
+      options.ranks = ranks;
+      const RunSummary summary = resolve(scene, options);
+      if (!ranks.root()) return;
+      EXPECT_GT(summary.rbc, 2);
+      const auto many = data::read_trajectories(options.out + "/trajectories.h5");
+      if (n == 1) {
+        one = many;
+        return;
+      }
+      EXPECT_EQ(many.time, one.time);
+      EXPECT_EQ(many.hematocrit_true, one.hematocrit_true);
+      // Round-off of a hundred steps, relative to the largest value of each list.
+      const auto expect_same = [&](const std::vector<double>& a, const std::vector<double>& b,
+                                   const std::string& what) {
+        double most = 0;
+        for (const double v : b) most = std::max(most, std::abs(v));
+        EXPECT_GT(b.size(), 0u) << what;
+        EXPECT_LE(largest_difference(a, b), 1e-9 * most) << what << " on " << n << " ranks";
+      };
+      for (const auto& [name, tracks] : one.kinds) {
+        const auto& other = many.kinds.at(name);
+        EXPECT_EQ(other.id, tracks.id);
+        expect_same(other.position, tracks.position, name + " position");
+        expect_same(other.orientation, tracks.orientation, name + " orientation");
+        // In the plane of a body of revolution any two axes are principal ones: round-off chooses.
+        for (const auto& [what, values] : tracks.observables)
+          if (name != "platelet" || !what.ends_with("_diameter"))
+            expect_same(other.observables.at(what), values, name + " " + what);
+      }
+      expect_same(many.profile.velocity, one.profile.velocity, "velocity");
+      expect_same(many.profile.hematocrit, one.profile.hematocrit, "hematocrit");
+      expect_same(many.profile.shear_stress, one.profile.shear_stress, "stress");
+      expect_same(many.diagnostics.slip_rms, one.diagnostics.slip_rms, "slip");
+      expect_same(many.diagnostics.volume_error_max, one.diagnostics.volume_error_max, "volume error");
+      expect_same(many.diagnostics.overlap_max, one.diagnostics.overlap_max, "overlap");
+      for (const double r : many.diagnostics.momentum_residual) EXPECT_LT(std::abs(r), 1e-11);
+    });
+  if (world().root()) std::filesystem::remove_all(folder);
+}
+
+TEST(RanksOfTheSolver, TooManyRanksAreRefused) {
+  data::Scene scene = long_scene();
+  scene.domain.size[2] = 20e-6;
+  try {
+    Simulation<float> sim(scene, {crowd()[0]}, world());
+    FAIL() << "three slabs of 13 planes for a cell of 16";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("use 2 or fewer ranks"), std::string::npos) << error.what();
+  }
+  EXPECT_NO_THROW(Simulation<float>(long_scene(), {crowd()[0]}, world()));
+}
 
 }  // namespace
 }  // namespace hemowalk::resolved

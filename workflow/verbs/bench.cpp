@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/check.hpp"
+#include "core/mpi.hpp"
 #include "core/progress.hpp"
 #include "resolved/bench.hpp"
 #include "workflow/command.hpp"
@@ -136,6 +137,7 @@ void print_scaling(const std::vector<std::pair<std::string, BenchReport>>& repor
 }
 
 int bench(const Flags& flags, const std::string& names, int steps) {
+  mpi::start();  // under mpirun or srun: all ranks time one run
   require(flags.file.empty() || names.empty(),
           "both a scene file and --scene are given (one is benched) drop one");
   std::vector<std::pair<std::string, data::Scene>> asked;

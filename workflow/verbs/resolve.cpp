@@ -5,10 +5,12 @@
 
 #include <chrono>
 #include <filesystem>
+#include <memory>
 
 #include "core/check.hpp"
 #include "core/io.hpp"
 #include "core/log.hpp"
+#include "core/mpi.hpp"
 #include "core/progress.hpp"
 #include "resolved/resolve.hpp"
 #include "workflow/command.hpp"
@@ -30,7 +32,8 @@ void require_feasible(const data::Scene& scene, const std::string& file) {
 }
 
 /// Runs the scene and keeps status.json up to date until the very end, whatever the end is.
-resolved::RunSummary run_with_status(const data::Scene& scene, const std::string& folder, bool resume) {
+resolved::RunSummary run_with_status(const data::Scene& scene, const std::string& folder, bool resume,
+                                     const mpi::Ranks& ranks) {
   const auto start = clock::now();
   auto last = start - std::chrono::hours(1);
   Status status = read_status(folder).value_or(Status{});
@@ -46,6 +49,7 @@ resolved::RunSummary run_with_status(const data::Scene& scene, const std::string
   options.out = folder;
   options.resume = resume;
   options.stop_requested = stop_requested;
+  options.ranks = ranks;
   options.progress = [&](double fraction, const std::string& line) {
     progress.update(fraction, line);
     status.progress = fraction, status.line = line;
@@ -75,22 +79,37 @@ resolved::RunSummary run_with_status(const data::Scene& scene, const std::string
 int resolve(const Flags& flags, bool resume) {
   require(!flags.file.empty(), "resolve needs a scene (scene.yaml) give its file: hemowalk resolve FILE");
   catch_stop_signals();
+  mpi::start();  // under mpirun or srun: one run on many ranks, of which the root speaks to the user
+  if (mpi::world_rank() != 0) set_log_level(LogLevel::error);
   const auto scene = data::read_scene(flags.file, overrides(flags));
   require_feasible(scene, flags.file);
   const std::string folder = flags.out.empty() ? "out/" + scene.input_sha256.substr(0, 12) : flags.out;
-  fs::create_directories(folder);
-  Lock lock(folder + "/.lock");
-  if (!lock.held()) log_info("another process works in " + folder + ": waiting for it to stop");
-  require(lock.wait(60), "another process works in " + folder +
-                             " (it holds the folder's lock) wait for it or choose another --out");
+  const auto ranks = mpi::Ranks::world();
+  std::unique_ptr<Lock> lock;
+  ranks.on_root([&] {
+    fs::create_directories(folder);
+    lock = std::make_unique<Lock>(folder + "/.lock");
+    if (!lock->held()) log_info("another process works in " + folder + ": waiting for it to stop");
+    require(lock->wait(60), "another process works in " + folder +
+                                " (it holds the folder's lock) wait for it or choose another --out");
 
-  const std::string copy = folder + "/scene.yaml";
-  const bool known = fs::exists(copy);
-  require(
-      !known || fs::equivalent(copy, flags.file) || data::read_scene(copy).input_sha256 == scene.input_sha256,
-      folder + " holds the run of another scene (its scene.yaml differs) choose another --out");
-  if (!known) write_file_atomic(copy, scene.source_text);
-  const auto summary = run_with_status(scene, folder, resume);
+    const std::string copy = folder + "/scene.yaml";
+    const bool known = fs::exists(copy);
+    require(!known || fs::equivalent(copy, flags.file) ||
+                data::read_scene(copy).input_sha256 == scene.input_sha256,
+            folder + " holds the run of another scene (its scene.yaml differs) choose another --out");
+    if (!known) write_file_atomic(copy, scene.source_text);
+  });
+  if (!ranks.root()) {
+    resolved::RunOptions options;
+    options.out = folder;
+    options.resume = resume;
+    options.stop_requested = stop_requested;
+    options.ranks = ranks;
+    (void)resolved::resolve(scene, options);
+    return 0;
+  }
+  const auto summary = run_with_status(scene, folder, resume, ranks);
 
   if (flags.json) {
     auto object = json_head("resolve", scene.input_sha256, scene.seed);
