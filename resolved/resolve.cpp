@@ -20,6 +20,7 @@
 #include "resolved/gather.hpp"
 #include "resolved/packing.hpp"
 #include "resolved/recorder.hpp"
+#include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
 #include "resolved/surface_output.hpp"
 
@@ -68,7 +69,10 @@ class Run {
     const double start = omp_get_wtime();
     const std::int64_t first = resume();
     if (schedule_.surface > 0 && root()) surfaces_ = make_surfaces();
-    if (first == 0) outputs(0);
+    if (first == 0) {
+      recorder_.trajectories().t_c = recovery_time(scene_);
+      outputs(0);
+    }
     double last_checkpoint = omp_get_wtime();
     mpi::Agreement agreement(options_.ranks);
     while (simulation_.fluid_steps() < schedule_.end) {

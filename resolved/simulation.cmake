@@ -10,6 +10,7 @@ hemowalk_library(hemowalk_resolved
     packing.cpp
     preflight.cpp
     recorder.cpp
+    recovery.cpp
     region.cpp
     resolve.cpp
     simulation.cpp

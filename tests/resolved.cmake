@@ -1,7 +1,7 @@
 if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
-            verification/test_resolved_tube.cpp
+            verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
     LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
   add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)
@@ -12,6 +12,6 @@ if(TARGET hemowalk_resolved)
     "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMP_NUM_THREADS=1")
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
-            validation/test_resolved_vessel.cpp
+            validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
 endif()

@@ -90,7 +90,7 @@ void compare(double diameter, double hematocrit, double duration) {
 
 TEST(Vessel, ViscosityAndFahraeusEffectOfPries) {
   const char* longer = std::getenv("HEMOWALK_VESSEL_MS");
-  const double duration = 1e-3 * (longer ? std::atof(longer) : 120);
+  const double duration = 1e-3 * (longer ? std::atof(longer) : 400);
   std::printf("| diameter, um | tube hematocrit | discharge | viscosity | Pries | Ht/Hd | Pries |\n");
   for (const double hematocrit : {0.15, 0.3}) compare(20, hematocrit, duration);
   compare(40, 0.3, duration);
