@@ -1,3 +1,4 @@
 # The device code, thread by thread on the host, and on a GPU where there is one (else those tests are skipped).
 hemowalk_test(test_device_launch SOURCES unit/test_device_launch.cpp LINK hemowalk_core LABELS unit)
 hemowalk_test(test_device_fluid SOURCES unit/test_device_fluid.cpp LINK hemowalk_lbm LABELS unit)
+hemowalk_test(test_device_markers SOURCES unit/test_device_markers.cpp LINK hemowalk_ibm LABELS unit)
