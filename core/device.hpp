@@ -160,6 +160,32 @@ inline bool device_present() {
 #endif
 }
 
+/// Memory of the host that a device's copies may read and write while the host goes on, for as long as this
+/// lives.
+class Pinned {
+ public:
+  Pinned([[maybe_unused]] Place place, [[maybe_unused]] const void* data,
+         [[maybe_unused]] std::size_t bytes) {
+#if defined(HEMOWALK_CUDA)
+    if (place == Place::host || bytes == 0) return;
+    if (cudaHostRegister(const_cast<void*>(data), bytes, cudaHostRegisterDefault) == cudaSuccess)
+      data_ = data;
+    else
+      (void)cudaGetLastError();  // copies then wait for each other, that is all
+#endif
+  }
+  Pinned(Pinned&& o) noexcept : data_(std::exchange(o.data_, nullptr)) {}
+  Pinned& operator=(Pinned&&) = delete;
+  ~Pinned() {
+#if defined(HEMOWALK_CUDA)
+    if (data_) cudaHostUnregister(const_cast<void*>(data_));
+#endif
+  }
+
+ private:
+  const void* data_ = nullptr;
+};
+
 /// Recorded work, to be replayed by Queue::replay with one launch.
 class Graph {
  public:
@@ -347,12 +373,23 @@ class Queue {
 #endif
 };
 
+/// A copy of \p source at \p place, there when the call returns: the streams of Queues do not wait for
+/// others.
+template <class T>
+Array<T> place_copy(Place place, const Array<T>& source) {
+  Array<T> copy = copy_to(place, source);
+#if defined(HEMOWALK_CUDA)
+  if (place == Place::device) detail::check(cudaDeviceSynchronize(), "a copy to the device");
+#endif
+  return copy;
+}
+
 /// An array at \p place with the values of \p source.
 template <class T>
 Array<T> make_array(Place place, const std::vector<T>& source) {
   Array<T> host(source.size());
   if (!source.empty()) std::memcpy(static_cast<void*>(host.data()), source.data(), source.size() * sizeof(T));
-  return place == Place::host ? std::move(host) : copy_to(place, host);
+  return place == Place::host ? std::move(host) : place_copy(place, host);
 }
 
 }  // namespace hemowalk

@@ -37,8 +37,8 @@ class DeviceMarkers {
   // For kernels that look for neighbours.
   const Bins& bins() const { return bins_; }
   const std::uint32_t* begin() const { return begin_.data(); }
-  const Placed<Real>* placed() const { return placed_.data(); }
-  const std::int32_t* body() const { return body_.data(); }
+  /// Markers by bin, in no order within one.
+  const std::uint32_t* listed() const { return listed_.data(); }
 
  private:
   std::array<std::array<double, 3>, 2> sum(const Array<double>& planes) const;

@@ -53,7 +53,7 @@ struct Pair {
   void step() {
     force.next();
     host.advance(force.view(), host_velocity.view());
-    const auto placed_force = copy_to(queue.place(), force.field);
+    const auto placed_force = place_copy(queue.place(), force.field);
     device.advance(placed_force.data(), placed_velocity.data(), Real(0));
     queue.copy(device_velocity.data(), placed_velocity.data(), placed_velocity.size());
     queue.wait();
@@ -142,7 +142,7 @@ TEST_P(DeviceFluidTest, HaloHoldsImagesAndWalls) {
     const auto none = static_cast<const Node4<double>*>(nullptr);
     pair.device.moments(none, pair.placed_velocity.data(), 0);
     pair.device.advance(none, pair.placed_velocity.data(), 0);
-    const auto u = copy_to(Place::host, (pair.queue.wait(), pair.placed_velocity));
+    const auto u = place_copy(Place::host, (pair.queue.wait(), pair.placed_velocity));
     constexpr int h = Block::halo;
     for (int k = -h; k < b.nz + h; ++k)
       for (int j = -h; j < b.ny + h; ++j)
@@ -165,11 +165,11 @@ TEST_P(DeviceFluidTest, ShareOfTheForceIsAddedToTheVelocity) {
   const Block b{6, 5, 4};
   Pair<double> with(GetParam(), b, moving_walls(true), 2), without(GetParam(), b, moving_walls(true), 2);
   with.force.next();
-  const auto force = copy_to(GetParam(), with.force.field);
+  const auto force = place_copy(GetParam(), with.force.field);
   with.device.advance(force.data(), with.placed_velocity.data(), 0.485);
   without.device.advance(force.data(), without.placed_velocity.data(), 0);
-  const auto a = copy_to(Place::host, (with.queue.wait(), with.placed_velocity)),
-             c = copy_to(Place::host, (without.queue.wait(), without.placed_velocity));
+  const auto a = place_copy(Place::host, (with.queue.wait(), with.placed_velocity)),
+             c = place_copy(Place::host, (without.queue.wait(), without.placed_velocity));
   for_nodes(b, [&](int i, int j, int k) {
     const std::size_t n = b.at(i, j, k);
     EXPECT_DOUBLE_EQ(a[n].y, c[n].y + 0.485 * with.force.field[n].y);

@@ -69,9 +69,9 @@ Outcome<Real> on_queue(Place place, const Block& b, const Faces& faces, Kernel k
                        const Cloud<Real>& cloud) {
   Queue queue(place);
   DeviceMarkers<Real> markers(queue, b, faces, kernel, cloud.body);
-  const auto origin = copy_to(place, cloud.origin);
-  const auto local = copy_to(place, cloud.local), value = copy_to(place, cloud.value),
-             field = copy_to(place, cloud.field);
+  const auto origin = place_copy(place, cloud.origin);
+  const auto local = place_copy(place, cloud.local), value = place_copy(place, cloud.value),
+             field = place_copy(place, cloud.field);
   Array<Node4<Real>> read(cloud.local.size(), place), force(b.size(), place);
   for (int again = 0; again < 2; ++again) {  // the second time finds what the first has left
     markers.locate(origin.data(), local.data());
@@ -80,7 +80,7 @@ Outcome<Real> on_queue(Place place, const Block& b, const Faces& faces, Kernel k
   }
   queue.wait();
   EXPECT_EQ(markers.fault(), -1);
-  Outcome<Real> out{copy_to(Place::host, read), copy_to(Place::host, force), markers.wall_force()};
+  Outcome<Real> out{place_copy(Place::host, read), place_copy(Place::host, force), markers.wall_force()};
   for (int w = 0; w < 2; ++w)
     for (int d = 0; d < 3; ++d)
       EXPECT_DOUBLE_EQ(markers.wall_impulse()[w][d], 4 * out.wall[w][d]) << "two steps of two fluid steps";
@@ -165,13 +165,13 @@ TEST_P(DeviceMarkersTest, MarkersThatBlewUpAreNamedAndTakeNoPart) {
     local[2] = bad;
     Queue queue(GetParam());
     DeviceMarkers<double> markers(queue, b, Faces{}, Kernel::phi4, {0, 0, 0, 0});
-    const auto o = copy_to(GetParam(), origin);
-    const auto x = copy_to(GetParam(), local), v = copy_to(GetParam(), value);
+    const auto o = place_copy(GetParam(), origin);
+    const auto x = place_copy(GetParam(), local), v = place_copy(GetParam(), value);
     Array<Node4<double>> force(b.size(), GetParam());
     markers.locate(o.data(), x.data());
     markers.spread(v.data(), force.data(), 1);
     EXPECT_EQ(markers.fault(), 2);
-    const auto F = copy_to(Place::host, force);
+    const auto F = place_copy(Place::host, force);
     double sum = 0;
     for (const auto& node : F) sum += node.x;
     EXPECT_NEAR(sum, 3, 1e-12) << "the three good markers";
