@@ -149,7 +149,7 @@ void set_verdict(Calibration& c, const data::Trajectories& first) {
 }
 
 /// What a reader of the number must know.
-void set_warnings(Calibration& c, const data::Trajectories& first) {
+void set_warnings(Calibration& c, const data::Trajectories& first, bool memory_at_limit) {
   if (!c.law.gate.passed) {
     std::string names;
     for (const auto& f : c.law.gate.findings)
@@ -167,6 +167,10 @@ void set_warnings(Calibration& c, const data::Trajectories& first) {
   for (const Estimate* other : {line, gk})
     if (std::abs(other->D - c.law.core.D) > 3 * std::hypot(other->sigma, c.law.core.D_sigma))
       c.warnings.push_back(other->name + " disagrees with the core value by more than three standard errors");
+  if (memory_at_limit)
+    c.warnings.push_back(
+        "the velocity remembers longer than lags of an eighth of the window can tell: D may still rise; run "
+        "longer");
   if (c.law.core.D_sigma > 0.25 * c.law.core.D)
     c.warnings.push_back("the error of D exceeds 25 %: more platelet-seconds are needed (plan)");
 }
@@ -218,7 +222,7 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   set_steps(c, ensemble, core, lags);
   set_validity(c, ensemble, core, local);
   set_verdict(c, runs.front());
-  set_warnings(c, runs.front());
+  set_warnings(c, runs.front(), lags.memory.at_limit);
   for (const auto& r : runs) c.law.provenance.inputs_sha256.push_back(r.input_sha256);
   c.law.provenance.version = version();
   c.law.provenance.seed = options.seed;

@@ -244,6 +244,13 @@ Recommended recommend(const std::vector<Estimate>& all, const Lags& lags) {
   const Estimate &plateau = find("plateau"), &memory = find("memory"), &walls = find("local");
   char why[200];
   const double missing = 1 / lags.memory.factor(plateau.lag) - 1;
+  const Estimate& line = find("gls");
+  if (missing * plateau.D > plateau.sigma && lags.memory.at_limit && std::isfinite(line.D)) {
+    std::snprintf(why, sizeof why,
+                  "memory of at least %.3g ms, longer than these lags can tell: line from %.3g ms on",
+                  lags.memory.memory * 1e3, line.lag * 1e3);
+    return {line, why};
+  }
   if (missing * plateau.D > plateau.sigma && std::isfinite(memory.D)) {
     std::snprintf(why, sizeof why,
                   "memory of %.3g ms lowers D at the plateau lag by %.0f %%, more than its error",

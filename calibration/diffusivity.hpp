@@ -18,6 +18,9 @@ struct MemoryFit {
   double memory = 0;  ///< T, s; 0 = none seen
   double share = 0;   ///< of D
   double D = 0;       ///< m2/s, at long times
+  /// The best T is the longest that these lags can tell (a quarter of the longest lag): T and D are lower
+  /// bounds.
+  bool at_limit = false;
   /// MSD(lag)/(2 D lag): below 1 where the lag is not long against the memory.
   double factor(double lag) const;
 };
@@ -98,7 +101,8 @@ std::vector<Estimate> estimators(const Ensemble& ensemble, const Layer& core, co
                                  const Lags& lags, const Resampling& resampling, const LocalFit& fit);
 
 /// The estimate that goes into the law, and why: `plateau`, unless memory biases it by more than its error
-/// (`memory`) or walls and D(y) by more than a tenth of it (`local`).
+/// (`memory`; `gls` where the memory is longer than the lags can tell) or walls and D(y) by more than a tenth
+/// of it (`local`).
 struct Recommended {
   Estimate estimate;
   std::string reason;

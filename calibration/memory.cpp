@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "calibration/diffusivity.hpp"
+#include "core/statistics.hpp"
 
 namespace hemowalk::calibration {
 namespace {
@@ -69,7 +70,7 @@ class MemoryProblem {
       tm += weight_[k] * lag_[k] * half_msd[k];
       mm += weight_[k] * half_msd[k] * half_msd[k];
     }
-    MemoryFit best{0, 0, tm / tt};
+    MemoryFit best{0, 0, tm / tt, false};
     double least = mm - tm * tm / tt;
     for (std::size_t j = 0; j < times_.size(); ++j) {
       const double* b = &shape_[j * lag_.size()];
@@ -86,7 +87,7 @@ class MemoryProblem {
       const double chi = mm - free * tm - kept * bm;  // at the least-squares point
       if (chi < least) {
         least = chi;
-        best = {times_[j], kept / (free + kept), free + kept};
+        best = {times_[j], kept / (free + kept), free + kept, j + 1 == times_.size()};
       }
     }
     return best;
@@ -128,9 +129,27 @@ Estimate with_memory(const Ensemble& e, const Layer& layer, const Lags& lags, co
 #pragma omp parallel for schedule(static)
   for (int b = 0; b < resampling.draws(); ++b)
     draws[static_cast<std::size_t>(b)] = problem.solve(half_values(problem.msd(), resampling[b])).D;
-  set_errors(out, std::move(draws), {}, {});
+  std::vector<double> per_run, per_run_sigma;
+  if (e.runs.size() > 1)
+    for (const Run& run : e.runs) {
+      // One run alone: the weights of all other cells are zero.
+      std::vector<std::uint16_t> weight(e.paths.size(), 0);
+      std::fill(weight.begin() + static_cast<std::ptrdiff_t>(run.first),
+                weight.begin() + static_cast<std::ptrdiff_t>(run.last), std::uint16_t{1});
+      per_run.push_back(problem.solve(half_values(problem.msd(), weight.data())).D);
+      std::vector<double> own;
+      for (int b = 0; b < std::min(resampling.draws(), 100); ++b) {  // an error to 7 %
+        std::copy(resampling[b] + run.first, resampling[b] + run.last,
+                  weight.begin() + static_cast<std::ptrdiff_t>(run.first));
+        own.push_back(problem.solve(half_values(problem.msd(), weight.data())).D);
+      }
+      std::erase_if(own, [](double d) { return !std::isfinite(d); });
+      per_run_sigma.push_back(own.size() < 2 ? 0 : standard_deviation(own));
+    }
+  set_errors(out, std::move(draws), per_run, per_run_sigma);
   char note[120];
-  std::snprintf(note, sizeof note, "memory %.3g ms for %.0f %% of D", lags.memory.memory * 1e3,
+  std::snprintf(note, sizeof note, "memory %s%.3g ms for %.0f %% of D",
+                lags.memory.at_limit ? "of at least " : "", lags.memory.memory * 1e3,
                 100 * lags.memory.share);
   out.note = note;
   return out;

@@ -46,7 +46,7 @@ class Array {
     } else {
 #if defined(HEMOWALK_CUDA)
       if (cudaMalloc(reinterpret_cast<void**>(&data_), bytes) != cudaSuccess) throw std::bad_alloc();
-      cudaMemset(data_, 0, bytes);
+      cudaMemset(data_, 0, bytes), cudaStreamSynchronize(nullptr);  // a Queue's stream does not wait for it
 #else
       throw std::bad_alloc();  // built without CUDA: there is no device
 #endif

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/check.hpp"
+#include "resolved/contact/surface_normal.hpp"
 
 namespace hemowalk::contact {
 
@@ -40,52 +41,10 @@ Topology::Topology(const Shape& shape) : area(shape.area) {
     for (const std::uint32_t v : triangles[t]) ring[cursor[v]++] = t;
 }
 
-namespace {
-
-template <class T>
-Point<T> normal_of(const Topology& shape, const Point<T>* x, std::uint32_t t) {
-  const Corners& c = shape.triangles[t];
-  return unit_normal(x[c[0]], x[c[1]], x[c[2]]);
-}
-
-template <class T>
-Point<T> vertex_normal(const Topology& shape, const Point<T>* x, std::uint32_t v) {
-  Point<T> sum{0, 0, 0};
-  for (std::uint32_t i = shape.ring_begin[v]; i < shape.ring_begin[v + 1]; ++i) {
-    const Corners& c = shape.triangles[shape.ring[i]];
-    const int k = c[0] == v ? 0 : c[1] == v ? 1 : 2;
-    const Point<T> e = x[c[(k + 1) % 3]] - x[v], f = x[c[(k + 2) % 3]] - x[v];
-    const Point<T> n = cross(e, f);
-    const T sine = std::sqrt(dot(n, n));
-    if (sine > 0) sum = sum + (std::atan2(sine, dot(e, f)) / sine) * n;
-  }
-  return sum;
-}
-
-template <class T>
-Point<T> edge_normal(const Topology& shape, const Point<T>* x, std::uint32_t t, std::uint32_t v,
-                     std::uint32_t w) {
-  Point<T> sum = normal_of(shape, x, t);
-  for (std::uint32_t i = shape.ring_begin[v]; i < shape.ring_begin[v + 1]; ++i) {
-    const std::uint32_t other = shape.ring[i];
-    const Corners& c = shape.triangles[other];
-    if (other != t && (c[0] == w || c[1] == w || c[2] == w)) sum = sum + normal_of(shape, x, other);
-  }
-  return sum;
-}
-
-}  // namespace
-
 template <class T>
 Point<T> pseudo_normal(const Topology& shape, const Point<T>* x, std::uint32_t t, T wb, T wc) {
-  const T zero = sizeof(T) == 4 ? T(1e-6) : T(1e-13);
-  const T weight[3] = {T(1) - wb - wc, wb, wc};
-  const Corners& c = shape.triangles[t];
-  for (int k = 0; k < 3; ++k)
-    if (weight[k] >= T(1) - zero) return vertex_normal(shape, x, c[k]);
-  for (int k = 0; k < 3; ++k)
-    if (weight[k] <= zero) return edge_normal(shape, x, t, c[(k + 1) % 3], c[(k + 2) % 3]);
-  return normal_of(shape, x, t);
+  const auto at = [x](std::uint32_t v) { return x[v]; };
+  return surface_normal<T>(shape, at, t, wb, wc);
 }
 
 template Point<float> pseudo_normal(const Topology&, const Point<float>*, std::uint32_t, float, float);

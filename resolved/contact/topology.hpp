@@ -23,14 +23,6 @@ struct Topology {
   std::size_t vertices() const { return area.size(); }
 };
 
-/// Unit normal of a triangle, outwards for counter-clockwise corners.
-template <class T>
-Point<T> unit_normal(const Point<T>& a, const Point<T>& b, const Point<T>& c) {
-  const Point<T> n = cross(b - a, c - a);
-  const T length = std::sqrt(dot(n, n));
-  return (length > 0 ? T(1) / length : T(0)) * n;
-}
-
 /// Outward direction at a surface point, such that its sign against p - q tells on which side p is: the
 /// normal of the face, the sum of both normals on an edge, the angle-weighted sum at a vertex (Baerentzen &
 /// Aanaes 2005). \p x: positions of the body's vertices; the point is on triangle \p t with weights wb, wc.

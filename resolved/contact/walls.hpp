@@ -17,7 +17,7 @@ struct WallGap {
 template <class T>
 class WallGaps {
  public:
-  WallGaps(const Walls& walls, const Origin& origin)
+  HEMO_HD WallGaps(const Walls& walls, const Origin& origin)
       : geometry_(walls.geometry),
         lower_(static_cast<T>(walls.lower - origin[1])),
         upper_(static_cast<T>(walls.upper - origin[1])),

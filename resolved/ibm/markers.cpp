@@ -6,6 +6,7 @@
 
 #include "core/check.hpp"
 #include "core/simd.hpp"
+#include "resolved/ibm/site.hpp"
 
 namespace hemowalk::ibm {
 
@@ -14,18 +15,6 @@ namespace {
 constexpr int ahead = 8;  ///< markers between asking for nodes and using them
 
 constexpr int lanes = 16;
-
-/// Node left of coordinate X and the fraction to it; nodes sit at i + 1/2.
-template <class Real>
-struct Coordinate {
-  int node;
-  Real fraction;
-};
-template <class Real>
-HEMO_INLINE Coordinate<Real> split(int origin, Real local) {
-  const Real shifted = local - Real(0.5), whole = std::floor(shifted);
-  return {origin + static_cast<int>(whole), shifted - whole};
-}
 
 /// The four weights of up to 16 markers, structure of arrays.
 template <class Real>

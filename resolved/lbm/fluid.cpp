@@ -63,7 +63,7 @@ void Fluid<Real>::set_wall_terms() {
     wall_impulse_per_node_[w] = {};
     for (int i = 0; i < directions; ++i) {
       if (!leaves(w == 0 ? Wall::lower : Wall::upper, i)) continue;
-      const Real term = Real(6 * weight(i) * (c[i][0] * u[w][0] + c[i][2] * u[w][2]));
+      const Real term = wall_kick<Real>(i, u[w]);
       wall_term_[w][i] = term;
       for (int a = 0; a < 3; ++a) wall_impulse_per_node_[w][a] -= c[i][a] * static_cast<double>(term);
     }

@@ -81,6 +81,7 @@ class Fluid {
 
   const Block& block() const { return block_; }
   const Parameters& parameters() const { return parameters_; }
+  const Relaxation<Real>& relaxation() const { return rate_; }
   double viscosity() const { return (parameters_.tau - 0.5) / 3; }
   std::int64_t steps() const { return steps_; }
 

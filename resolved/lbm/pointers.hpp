@@ -13,6 +13,12 @@ constexpr bool leaves(Wall wall, int i) {
   return (wall == Wall::lower && c[i][1] == 1) || (wall == Wall::upper && c[i][1] == -1);
 }
 
+/// What population \p i gains when it leaves a wall of velocity \p u (half-way bounce-back).
+template <class Real, class Velocity>
+Real wall_kick(int i, const Velocity& u) {
+  return Real(6 * weight(i) * (c[i][0] * u[0] + c[i][2] * u[2]));
+}
+
 template <class Real>
 struct RowPointers {
   Real* p[directions];

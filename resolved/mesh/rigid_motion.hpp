@@ -13,13 +13,13 @@ struct Inertia {
   T xx{0}, yy{0}, zz{0}, xy{0}, xz{0}, yz{0};  ///< sum m r_i r_j
 
   template <class S>
-  void add(const S& m, const Vector<T>& r) {
+  HEMO_HD void add(const S& m, const Vector<T>& r) {
     const Vector<T> q = m * r;
     first = first + q;
     xx += q.x * r.x, yy += q.y * r.y, zz += q.z * r.z;
     xy += q.x * r.y, xz += q.x * r.z, yz += q.y * r.z;
   }
-  void add(const Inertia& o) {
+  HEMO_HD void add(const Inertia& o) {
     first = first + o.first;
     xx += o.xx, yy += o.yy, zz += o.zz, xy += o.xy, xz += o.xz, yz += o.yz;
   }
@@ -29,12 +29,12 @@ template <class T>
 struct Momentum {
   Vector<T> linear{T(0), T(0), T(0)}, angular{T(0), T(0), T(0)};
   template <class S>
-  void add(const S& m, const Vector<T>& r, const Vector<T>& v) {
+  HEMO_HD void add(const S& m, const Vector<T>& r, const Vector<T>& v) {
     const Vector<T> p = m * v;
     linear = linear + p;
     angular = angular + cross(r, p);
   }
-  void add(const Momentum& o) {
+  HEMO_HD void add(const Momentum& o) {
     linear = linear + o.linear;
     angular = angular + o.angular;
   }
@@ -50,7 +50,7 @@ struct RigidMotion {
 template <class T>
 class Body {
  public:
-  Body(const T& mass, const Inertia<T>& i) : mass_(mass), centre_((1 / mass) * i.first) {
+  HEMO_HD Body(const T& mass, const Inertia<T>& i) : mass_(mass), centre_((1 / mass) * i.first) {
     const Vector<T>& c = centre_;
     const T xx = i.xx - i.first.x * c.x, yy = i.yy - i.first.y * c.y, zz = i.zz - i.first.z * c.z;
     const T xy = i.xy - i.first.x * c.y, xz = i.xz - i.first.x * c.z, yz = i.yz - i.first.y * c.z;
@@ -60,14 +60,14 @@ class Body {
     xx_ = ca * inverse, xy_ = ce * inverse, xz_ = cf * inverse;
     yy_ = (a * d - f * f) * inverse, yz_ = (e * f - a * g) * inverse, zz_ = (a * b - e * e) * inverse;
   }
-  const Vector<T>& centre() const { return centre_; }
+  HEMO_HD const Vector<T>& centre() const { return centre_; }
 
   /// The rigid motion with momentum \\p p taken about the origin.
-  RigidMotion<T> motion(const Momentum<T>& p) const {
+  HEMO_HD RigidMotion<T> motion(const Momentum<T>& p) const {
     return motion_about_centre({p.linear, p.angular - cross(centre_, p.linear)});
   }
   /// The same with the angular part taken about the centre.
-  RigidMotion<T> motion_about_centre(const Momentum<T>& p) const {
+  HEMO_HD RigidMotion<T> motion_about_centre(const Momentum<T>& p) const {
     const auto& l = p.angular;
     return {(1 / mass_) * p.linear,
             {xx_ * l.x + xy_ * l.y + xz_ * l.z, xy_ * l.x + yy_ * l.y + yz_ * l.z,

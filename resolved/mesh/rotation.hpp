@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/portability.hpp"
 #include "resolved/mesh/mesh.hpp"
 
 namespace hemowalk::mesh {
@@ -14,7 +15,7 @@ using Matrix3 = std::array<double, 9>;     ///< row major
 inline constexpr Quaternion identity_rotation{1, 0, 0, 0};
 
 /// Rotation about \p axis (any length > 0) by \p angle, rad.
-inline Quaternion rotation(const Vec3& axis, double angle) {
+HEMO_HD inline Quaternion rotation(const Vec3& axis, double angle) {
   const double length = std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
   if (length == 0) return identity_rotation;
   const double s = std::sin(angle / 2) / length;
@@ -22,29 +23,29 @@ inline Quaternion rotation(const Vec3& axis, double angle) {
 }
 
 /// First \p b, then \p a.
-inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {
+HEMO_HD inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
           a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
           a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
           a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]};
 }
 
-inline Quaternion normalized(const Quaternion& q) {
+HEMO_HD inline Quaternion normalized(const Quaternion& q) {
   const double s = 1 / std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   return {s * q[0], s * q[1], s * q[2], s * q[3]};
 }
 
-inline Matrix3 matrix(const Quaternion& q) {
+HEMO_HD inline Matrix3 matrix(const Quaternion& q) {
   const auto [w, x, y, z] = q;
   return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
           2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
-inline Vec3 transform(const Matrix3& m, const Vec3& v) {
+HEMO_HD inline Vec3 transform(const Matrix3& m, const Vec3& v) {
   return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
           m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
 }
-inline Vec3 rotate(const Quaternion& q, const Vec3& v) { return transform(matrix(q), v); }
+HEMO_HD inline Vec3 rotate(const Quaternion& q, const Vec3& v) { return transform(matrix(q), v); }
 
 }  // namespace hemowalk::mesh

@@ -285,20 +285,32 @@ void Membranes<Real>::save(int c, std::byte* out) const {
 
 template <class Real>
 int Membranes<Real>::load(const std::byte* in) {
+  const int c = add(0, {0, 0, 0}, mesh::identity_rotation);
+  restore(c, in);
+  return c;
+}
+
+template <class Real>
+mesh::HostFields<Real> Membranes<Real>::host_fields() {
+  return {impl_->vertices,        batches(),
+          impl_->anchor.data(),   impl_->offset.data(),
+          impl_->velocity.data(), impl_->normal.data(),
+          impl_->predicted.data()};
+}
+
+template <class Real>
+void Membranes<Real>::restore(int c, const std::byte* in) {
   const auto read = [&in](auto& value) {
     std::memcpy(&value, in, sizeof value);
     in += sizeof value;
   };
-  std::int64_t id;
   Vec3 anchor;
-  read(id);
+  read(impl_->ids[c]);
   read(anchor);
-  const int c = add(id, {0, 0, 0}, mesh::identity_rotation);
   for (int d = 0; d < 3; ++d) impl_->anchor[layout().anchor(c, d)] = anchor[d];
   for (auto* field : impl_->state())
     for (int k = 0; k < vertices(); ++k)
       for (int d = 0; d < 3; ++d) read((*field)[layout().at(c, k, d)]);
-  return c;
 }
 
 template <class Real>

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/array.hpp"
+#include "resolved/mesh/host_fields.hpp"
 #include "resolved/mesh/lanes.hpp"
 #include "resolved/mesh/observables.hpp"
 #include "resolved/mesh/rotation.hpp"
@@ -72,7 +73,10 @@ class Membranes {
   /// Exact state of a cell: for checkpoints and migration between ranks.
   std::size_t state_bytes() const;
   void save(int c, std::byte* out) const;
-  int load(const std::byte* in);  ///< adds the saved cell; \returns its index
+  int load(const std::byte* in);             ///< adds the saved cell; \returns its index
+  void restore(int c, const std::byte* in);  ///< cell c becomes the saved one
+  /// For who takes the step elsewhere and writes its outcome here.
+  mesh::HostFields<Real> host_fields();
 
   // --- membranes only ----------------------------------------------------------------------------------
   const CellType& type() const;

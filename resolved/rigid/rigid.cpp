@@ -7,6 +7,8 @@
 
 #include "core/check.hpp"
 #include "resolved/mesh/vector.hpp"
+#include "resolved/rigid/motion.hpp"
+#include "resolved/rigid/shape.hpp"
 
 namespace hemowalk::rigid {
 
@@ -17,19 +19,6 @@ using mesh::Vec3;
 
 namespace {
 
-/// What all bodies of a type share: arms from the metric's centre in the body frame, inertia about it.
-struct Shape {
-  explicit Shape(const BodyType& type);
-
-  std::vector<Vec3> arm, normal;  ///< body frame
-  Vec3 centre{};                  ///< of the metric, in the frame of type.rest
-  double mass = 0;
-  Matrix3 inertia{}, inverse_inertia{};
-  std::vector<double> area;
-  double bounding_radius = 0, volume = 0;
-  int marker = 0;
-};
-
 Matrix3 inverse(const Matrix3& m) {
   const Vec3 a{m[0], m[1], m[2]}, b{m[3], m[4], m[5]}, c{m[6], m[7], m[8]};
   const double det = mesh::dot(a, cross(b, c));
@@ -37,6 +26,8 @@ Matrix3 inverse(const Matrix3& m) {
   return {x[0] / det, y[0] / det, z[0] / det, x[1] / det, y[1] / det,
           z[1] / det, x[2] / det, y[2] / det, z[2] / det};
 }
+
+}  // namespace
 
 Shape::Shape(const BodyType& type)
     : arm(type.rest.vertices),
@@ -51,39 +42,20 @@ Shape::Shape(const BodyType& type)
   require(type.h > 0, "solid time step must be positive (a step moves by h v) give h > 0");
   for (std::size_t k = 0; k < arm.size(); ++k) {
     require(type.metric[k] > 0, "metric must be positive (m_k + k a_k) give the vertices mass or coupling");
-    mass += type.metric[k];
+    gyration.mass += type.metric[k];
     mesh::accumulate(centre, type.metric[k], arm[k]);
   }
-  centre = mesh::scale(1 / mass, centre);
+  centre = mesh::scale(1 / gyration.mass, centre);
   for (std::size_t k = 0; k < arm.size(); ++k) {
     arm[k] = mesh::subtract(arm[k], centre);
     const auto& r = arm[k];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
-        inertia[3 * i + j] += type.metric[k] * ((i == j ? mesh::dot(r, r) : 0) - r[i] * r[j]);
+        gyration.inertia[3 * i + j] += type.metric[k] * ((i == j ? mesh::dot(r, r) : 0) - r[i] * r[j]);
   }
-  inverse_inertia = inverse(inertia);
+  gyration.inverse_inertia = inverse(gyration.inertia);
+  gyration.h = type.h;
 }
-
-Matrix3 transposed(const Matrix3& m) { return {m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}; }
-
-/// Rotation by the vector \p turn (rad): r -> r + a turn x r + b turn x (turn x r).
-struct Turn {
-  explicit Turn(const Vec3& turn) : vector(turn) {
-    const double t2 = mesh::dot(turn, turn), t = std::sqrt(t2);
-    a = t2 < 1e-6 ? 1 - t2 / 6 * (1 - t2 / 20) : std::sin(t) / t;
-    const double s = t2 < 1e-6 ? 1 - t2 / 24 * (1 - t2 / 80) : std::sin(t / 2) / (t / 2);
-    b = s * s / 2;
-  }
-  Vec3 chord(const Vec3& r) const {
-    const auto once = cross(vector, r);
-    return mesh::add(mesh::scale(a, once), mesh::scale(b, cross(vector, once)));
-  }
-  Vec3 vector;
-  double a, b;
-};
-
-}  // namespace
 
 template <class Real>
 struct RigidBodies<Real>::Impl {
@@ -142,24 +114,6 @@ struct RigidBodies<Real>::Impl {
     for (int d = 0; d < 3; ++d) anchor[layout().anchor(c, d)] = x[d];
   }
 
-  /// omega from the angular momentum \p l about the centre, world frame: l = a I omega + b h omega x I omega,
-  /// where the second part comes from the chords of a finite turn (and is the gyroscopic term).
-  Vec3 spin_of(const Vec3& l, const Matrix3& turn) const {
-    const auto target = mesh::transform(transposed(turn), l);
-    Vec3 omega = mesh::transform(shape.inverse_inertia, target);
-    for (int i = 0; i < 50; ++i) {
-      const Turn now(mesh::scale(type.h, omega));
-      const auto gyro = cross(omega, mesh::transform(shape.inertia, omega));
-      const auto next = mesh::scale(
-          1 / now.a,
-          mesh::transform(shape.inverse_inertia, mesh::subtract(target, mesh::scale(now.b * type.h, gyro))));
-      const double change = mesh::norm(mesh::subtract(next, omega));
-      omega = next;
-      if (change <= 1e-15 * mesh::norm(omega)) break;
-    }
-    return mesh::transform(turn, omega);
-  }
-
   void step(int c) {
     const auto turn = mesh::matrix(orientation[c]);
     Vec3 linear{}, angular{};
@@ -171,8 +125,8 @@ struct RigidBodies<Real>::Impl {
       mesh::accumulate(linear, 1, p);
       mesh::accumulate(angular, 1, cross(r, p));
     }
-    velocity_of_centre[c] = mesh::scale(1 / shape.mass, linear);
-    spin[c] = spin_of(angular, turn);
+    velocity_of_centre[c] = mesh::scale(1 / shape.gyration.mass, linear);
+    spin[c] = shape.gyration.spin_of(angular, turn);
     move(c, turn);
   }
 
@@ -184,8 +138,7 @@ struct RigidBodies<Real>::Impl {
         velocity[layout().at(c, k, d)] = static_cast<Real>(velocity_of_centre[c][d] + chord[d] / type.h);
     }
     set_anchor(c, mesh::add(anchor_of(c), mesh::scale(type.h, velocity_of_centre[c])));
-    orientation[c] = mesh::normalized(
-        mesh::multiply(mesh::rotation(step.vector, mesh::norm(step.vector)), orientation[c]));
+    orientation[c] = turned(step, orientation[c]);
     place(c);
   }
 };
@@ -341,15 +294,28 @@ void RigidBodies<Real>::save(int c, std::byte* out) const {
 
 template <class Real>
 int RigidBodies<Real>::load(const std::byte* in) {
+  const int c = add(0, {0, 0, 0}, mesh::identity_rotation);
+  restore(c, in);
+  return c;
+}
+
+template <class Real>
+mesh::HostFields<Real> RigidBodies<Real>::host_fields() {
+  return {impl_->vertices,        batches(),
+          impl_->anchor.data(),   impl_->offset.data(),
+          impl_->velocity.data(), impl_->normal.data(),
+          impl_->predicted.data()};
+}
+
+template <class Real>
+void RigidBodies<Real>::restore(int c, const std::byte* in) {
   const auto read = [&in](auto& value) {
     std::memcpy(&value, in, sizeof value);
     in += sizeof value;
   };
-  std::int64_t id;
   Vec3 anchor;
-  read(id);
+  read(impl_->ids[c]);
   read(anchor);
-  const int c = add(id, {0, 0, 0}, mesh::identity_rotation);
   impl_->set_anchor(c, anchor);
   read(impl_->orientation[c]);
   read(impl_->velocity_of_centre[c]);
@@ -357,7 +323,15 @@ int RigidBodies<Real>::load(const std::byte* in) {
   for (int k = 0; k < vertices(); ++k)
     for (int d = 0; d < 3; ++d) read(impl_->velocity[layout().at(c, k, d)]);
   impl_->place(c);
-  return c;
+}
+
+template <class Real>
+const Shape& RigidBodies<Real>::shape() const {
+  return impl_->shape;
+}
+template <class Real>
+const BodyType& RigidBodies<Real>::type() const {
+  return impl_->type;
 }
 
 template <class Real>

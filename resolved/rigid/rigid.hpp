@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/array.hpp"
+#include "resolved/mesh/host_fields.hpp"
 #include "resolved/mesh/lanes.hpp"
 #include "resolved/mesh/observables.hpp"
 #include "resolved/mesh/rotation.hpp"
@@ -24,6 +25,8 @@ struct BodyType {
   std::vector<double> metric;  ///< m_k + k a_k: the mass of the implicit step, > 0
   double h = 1;                ///< solid time step
 };
+
+struct Shape;
 
 using mesh::StepOptions;
 using mesh::StepReport;
@@ -72,8 +75,13 @@ class RigidBodies {
   std::size_t state_bytes() const;
   void save(int c, std::byte* out) const;
   int load(const std::byte* in);
+  void restore(int c, const std::byte* in);  ///< body c becomes the saved one
+  /// For who takes the step elsewhere and writes its outcome here (orientations come with restore()).
+  mesh::HostFields<Real> host_fields();
 
   // --- rigid bodies only -------------------------------------------------------------------------------
+  const BodyType& type() const;
+  const Shape& shape() const;
   mesh::Quaternion orientation(int c) const;
   mesh::Vec3 velocity(int c) const;  ///< of the centre
   mesh::Vec3 angular_velocity(int c) const;

@@ -1,0 +1,8 @@
+# The device code, thread by thread on the host, and on a GPU where there is one (else those tests are skipped).
+hemowalk_test(test_device_launch SOURCES unit/test_device_launch.cpp LINK hemowalk_core LABELS unit)
+hemowalk_test(test_device_fluid SOURCES unit/test_device_fluid.cpp LINK hemowalk_lbm LABELS unit)
+hemowalk_test(test_device_markers SOURCES unit/test_device_markers.cpp LINK hemowalk_ibm LABELS unit)
+hemowalk_test(test_device_membranes SOURCES unit/test_device_membranes.cpp LINK hemowalk_npfem LABELS unit)
+hemowalk_test(test_device_bodies SOURCES unit/test_device_bodies.cpp LINK hemowalk_rigid LABELS unit)
+hemowalk_test(test_device_contact SOURCES unit/test_device_contact.cpp LINK hemowalk_contact hemowalk_ibm hemowalk_mesh
+              LABELS unit)

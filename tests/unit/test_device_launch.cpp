@@ -1,0 +1,131 @@
+// The launch layer on the host: every thread once, phases as barriers, recorded work. The functors here are
+// not compiled for a device: what a device does with functors is tested with the solver's own.
+
+#include <gtest/gtest.h>
+
+#include "support/places.hpp"
+
+namespace hemowalk {
+namespace {
+
+constexpr HostThreads orders[] = {HostThreads::forward, HostThreads::backward, HostThreads::scattered};
+
+struct CountVisits {
+  unsigned* visits;
+  void operator()(std::size_t i) const { atomic_add(visits + i, 1); }
+};
+
+// Each block sums its share: every thread leaves a number, the first adds them in the next phase.
+struct BlockSum {
+  static constexpr int threads = 96;
+  const int* value;
+  std::int64_t* sum;
+  int phases() const { return 2; }
+  void operator()(int phase, BlockThread at, unsigned char* shared) const {
+    int* part = reinterpret_cast<int*>(shared);
+    if (phase == 0) part[at.thread] = value[at.block * threads + at.thread];
+    if (phase == 1 && at.thread == 0) {
+      std::int64_t total = 0;
+      for (int t = 0; t < threads; ++t) total += part[t];
+      sum[at.block] = total;
+    }
+  }
+};
+
+// Wrong on purpose: a thread reads what its neighbour writes in the same phase.
+struct Racing {
+  static constexpr int threads = 32;
+  int* out;
+  int phases() const { return 2; }
+  void operator()(int phase, BlockThread at, unsigned char* shared) const {
+    int* part = reinterpret_cast<int*>(shared);
+    const unsigned t = at.thread;
+    if (phase == 0) part[t] = 0;
+    if (phase == 1) {
+      part[t] = 1;
+      out[t] = part[(t + 1) % threads];
+    }
+  }
+};
+
+TEST(Launch, ForEachVisitsEveryIndexOnce) {
+  Queue queue(Place::host);
+  for (const HostThreads order : orders) {
+    test::ThreadOrder now(order);
+    Array<unsigned> visits(1001);
+    queue.for_each(visits.size(), CountVisits{visits.data()});
+    for (const unsigned n : visits) EXPECT_EQ(n, 1u);
+  }
+}
+
+TEST(Launch, PhasesAreBarriersInAnyOrderOfThreads) {
+  Queue queue(Place::host);
+  Array<int> value(7 * BlockSum::threads);
+  for (std::size_t i = 0; i < value.size(); ++i) value[i] = static_cast<int>(i * i % 101);
+  for (const HostThreads order : orders) {
+    test::ThreadOrder now(order);
+    Array<std::int64_t> sum(7);
+    queue.blocks(7, BlockSum::threads * sizeof(int), BlockSum{value.data(), sum.data()});
+    for (std::size_t b = 0; b < 7; ++b) {
+      std::int64_t expected = 0;
+      for (std::size_t t = 0; t < BlockSum::threads; ++t) expected += value[b * BlockSum::threads + t];
+      EXPECT_EQ(sum[b], expected);
+    }
+  }
+}
+
+// What makes the comparison of orders a test for races: it finds one.
+TEST(Launch, ThreadsThatMeetWithinAPhaseShowInTheirOrder) {
+  Queue queue(Place::host);
+  const auto outcome = [&](HostThreads order) {
+    test::ThreadOrder now(order);
+    Array<int> out(Racing::threads);
+    queue.blocks(1, Racing::threads * sizeof(int), Racing{out.data()});
+    return std::vector<int>(out.begin(), out.end());
+  };
+  EXPECT_NE(outcome(HostThreads::forward), outcome(HostThreads::backward));
+}
+
+TEST(Launch, ScatteredOrderIsAPermutation) {
+  for (const unsigned n : {1u, 32u, 96u, 288u, 1024u}) {
+    std::vector<int> seen(n, 0);
+    for (unsigned i = 0; i < n; ++i) ++seen.at(detail::host_thread(i, n, HostThreads::scattered));
+    for (const int s : seen) EXPECT_EQ(s, 1);
+  }
+}
+
+TEST(Launch, RecordedWorkRunsWhenReplayedOnly) {
+  Queue queue(Place::host);
+  Array<unsigned> visits(10);
+  queue.begin_recording();
+  queue.for_each(visits.size(), CountVisits{visits.data()});
+  queue.for_each(5, CountVisits{visits.data()});
+  const Graph graph = queue.end_recording();
+  EXPECT_EQ(graph.size(), 2u);
+  EXPECT_EQ(visits[0], 0u);
+  queue.replay(graph);
+  queue.replay(graph);
+  EXPECT_EQ(visits[0], 4u);
+  EXPECT_EQ(visits[9], 2u);
+  queue.for_each(1, CountVisits{visits.data()});  // recording has ended
+  EXPECT_EQ(visits[0], 5u);
+}
+
+TEST(Launch, IntegerAtomics) {
+  std::int64_t sum = 5;
+  atomic_add(&sum, -8);
+  EXPECT_EQ(sum, -3);
+  int least = 4;
+  atomic_min(&least, 7);
+  EXPECT_EQ(least, 4);
+  atomic_min(&least, -2);
+  EXPECT_EQ(least, -2);
+}
+
+TEST(Launch, AskingForAMissingDeviceIsAnInputError) {
+  if (device_present()) GTEST_SKIP() << "there is a device";
+  EXPECT_THROW(Queue(Place::device), InputError);
+}
+
+}  // namespace
+}  // namespace hemowalk
