@@ -10,6 +10,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/mesh/vector.hpp"
 #include "resolved/slip_correction.hpp"
 
 namespace hemowalk::resolved {
@@ -126,7 +127,10 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
       continue;
     const data::Kind& k = scene_.cells.kinds[kind];
     mesh::TriangleMesh rest = make_mesh(k, units_.dx);
-    const std::vector<double> area = mesh::vertex_areas(rest);
+    const bool is_rigid = k.law == data::Kind::Law::rigid;
+    mesh::TriangleMesh held = rest;
+    if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling.retraction);
+    const std::vector<double> area = mesh::vertex_areas(held);
     const double excess = (k.density / units_.density - 1) * mesh::volume(rest) / rest.vertex_count();
     std::vector<double> mass(area.size(), excess), weight(area.size()), metric(area.size());
     for (std::size_t v = 0; v < area.size(); ++v) {
@@ -137,9 +141,8 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
           "cells.kinds." + k.name +
               ".density is too low (the implicit mass of a vertex is not positive) raise it or coupling.chi");
     }
-    const bool is_rigid = k.law == data::Kind::Law::rigid;
     auto make = [&]() -> std::variant<npfem::Membranes<Real>, rigid::RigidBodies<Real>> {
-      if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_});
+      if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_, held.vertices});
       return npfem::Membranes<Real>(
           std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
     };
@@ -298,16 +301,22 @@ void Simulation<Real>::read_positions() {
               }
             const std::size_t slot = group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
             for (int k = 0; k < vertices; ++k) {
-              const Real* x = offsets + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
-              const Real* normal = normals + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
+              const std::size_t at = (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
+              const Real *x = offsets + at, *normal = normals + at;
               Node4<Real>*vertex = vertices_.data() + slot + k * lanes,
               *site = sites_.data() + slot + k * lanes;
               for (int l = 0; l < lanes; ++l) {
                 const Real px = fraction[0][l] + x[l], py = fraction[1][l] + x[lanes + l],
                            pz = fraction[2][l] + x[2 * lanes + l];
                 vertex[l] = {px, py, pz, Real(0)};
-                site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
-                           pz - delta * normal[2 * lanes + l], Real(0)};
+                if constexpr (requires { g.held(); }) {
+                  const Real* r = g.held().data + at;
+                  site[l] = {fraction[0][l] + r[l], fraction[1][l] + r[lanes + l],
+                             fraction[2][l] + r[2 * lanes + l], Real(0)};
+                } else {
+                  site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
+                             pz - delta * normal[2 * lanes + l], Real(0)};
+                }
               }
             }
           }
@@ -327,6 +336,7 @@ void Simulation<Real>::retract() {
   for (auto& group : groups_)
     std::visit(
         [&](const auto& g) {
+          if constexpr (requires { g.held(); }) return;  // rigid bodies move their coupling points themselves
           constexpr int lanes = std::decay_t<decltype(g)>::lanes;
           const auto& triangles = g.rest().triangles;
           const int vertices = g.vertices();
@@ -369,6 +379,20 @@ void Simulation<Real>::predict() {
           const Real *velocities = cells.velocities().data, *normals = cells.normals().data;
           Real* predicted = cells.predicted().data;
           const int vertices = cells.vertices();
+          if constexpr (requires { cells.held(); }) {
+            // v_pred belongs to the coupling points: what a force at the surface turns beyond them is a
+            // couple.
+            const auto at = cells.layout();
+#pragma omp parallel for schedule(static)
+            for (int c = 0; c < cells.count(); ++c)
+              for (int k = 0; k < vertices; ++k) {
+                const Node4<Real> F = contact_force_[group.marker(c, k)];
+                mesh::Vec3 arm;
+                for (int d = 0; d < 3; ++d)
+                  arm[d] = cells.offsets()[at.at(c, k, d)] - cells.held()[at.at(c, k, d)];
+                cells.add_couple(c, mesh::cross(arm, mesh::Vec3{F.x, F.y, F.z}));
+              }
+          }
 #pragma omp parallel for schedule(static)
           for (int b = 0; b < cells.batches(); ++b)
             for (int k = 0; k < vertices; ++k) {

@@ -1,6 +1,7 @@
 if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
+            verification/test_resolved_platelet.cpp
     LINK hemowalk_resolved LABELS unit verification)
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
