@@ -110,6 +110,32 @@ mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit) {
   return m;
 }
 
+std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
+                                        double retraction) {
+  // In units of the retraction of a flat sheet; measured: docs/evidence/validation.md, section 1.
+  constexpr double rim = 1.75, face = 1.5;
+  std::vector<mesh::Vec3> points = rest.vertices;
+  if (kind.shape.type == data::Shape::Type::platelet) {
+    mesh::Vec3 radius{};
+    for (const auto& p : points)
+      for (int d = 0; d < 3; ++d) radius[d] = std::max(radius[d], p[d]);
+    const mesh::Vec3 depth{rim * retraction, face * retraction, rim * retraction};
+    for (int d = 0; d < 3; ++d)
+      require(depth[d] < radius[d], [&] {
+        return "cells.kinds." + kind.name + " is too thin for coupling.retraction (its half thickness of " +
+               std::to_string(radius[d]) + " dx would be drawn back by " + std::to_string(depth[d]) +
+               " dx) lower fluid.dx or the retraction";
+      });
+    for (auto& p : points)
+      for (int d = 0; d < 3; ++d) p[d] *= 1 - depth[d] / radius[d];
+    return points;
+  }
+  const auto normals = mesh::vertex_normals(rest);
+  for (std::size_t k = 0; k < points.size(); ++k)
+    for (int d = 0; d < 3; ++d) points[k][d] -= retraction * normals[k][d];
+  return points;
+}
+
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units) {
   npfem::Material m;
   switch (kind.law) {

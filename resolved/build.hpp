@@ -24,6 +24,11 @@ lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units);
 double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double x, double y);
 /// Rest shape centred at the origin, in units of \p unit metres.
 mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
+/// Where a rigid body touches the fluid, in its own frame: every vertex drawn back along its normal by \p
+/// retraction (lattice units). A platelet's rim is sharper than that, its normals would cross: it becomes a
+/// smaller spheroid instead. \throws InputError when nothing would be left of it.
+std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
+                                        double retraction);
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);
 contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units);
 contact::Domain make_domain(const data::Scene& scene, const Block& block);

@@ -70,7 +70,7 @@ class Run {
     const std::int64_t first = resume();
     if (schedule_.surface > 0 && root()) surfaces_ = make_surfaces();
     if (first == 0) {
-      recorder_.trajectories().t_c = recovery_time(scene_);
+      if (root()) recorder_.trajectories().t_c = recovery_time(scene_);
       outputs(0);
     }
     double last_checkpoint = omp_get_wtime();

@@ -11,6 +11,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/mesh/vector.hpp"
 #include "resolved/region.hpp"
 #include "resolved/retraction.hpp"
 #include "resolved/slip_correction.hpp"
@@ -145,16 +146,22 @@ void Simulation<Real>::read_positions() {
             std::fill(low, low + lanes, std::numeric_limits<Real>::max());
             std::fill(high, high + lanes, std::numeric_limits<Real>::lowest());
             for (int k = 0; k < vertices; ++k) {
-              const Real* x = offsets + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
-              const Real* normal = normals + (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
+              const std::size_t at = (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
+              const Real *x = offsets + at, *normal = normals + at;
               Node4<Real>*vertex = vertices_.data() + slot + k * lanes,
               *site = sites_.data() + slot + k * lanes;
               for (int l = 0; l < lanes; ++l) {
                 const Real px = fraction[0][l] + x[l], py = fraction[1][l] + x[lanes + l],
                            pz = fraction[2][l] + x[2 * lanes + l];
                 vertex[l] = {px, py, pz, Real(0)};
-                site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
-                           pz - delta * normal[2 * lanes + l], Real(0)};
+                if constexpr (requires { g.held(); }) {
+                  const Real* r = g.held().data + at;
+                  site[l] = {fraction[0][l] + r[l], fraction[1][l] + r[lanes + l],
+                             fraction[2][l] + r[2 * lanes + l], Real(0)};
+                } else {
+                  site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
+                             pz - delta * normal[2 * lanes + l], Real(0)};
+                }
                 low[l] = std::min(low[l], std::min(pz, site[l].z));
                 high[l] = std::max(high[l], std::max(pz, site[l].z));
               }
@@ -193,6 +200,8 @@ void Simulation<Real>::retract() {
             Real* sum = scratch_.data() + static_cast<std::size_t>(omp_get_thread_num()) * scratch_stride_;
             std::fill(rate, rate + length, Real(0));
             std::fill(force, force + length, Real(0));
+            if constexpr (requires { g.held(); })
+              continue;  // rigid bodies move their coupling points themselves
             std::fill(sum, sum + length, Real(0));
             for (const auto& t : triangles) add_normals<lanes>(t, x, v, sum, rate);
             const Node4<Real>* J =
@@ -222,6 +231,20 @@ void Simulation<Real>::predict() {
           const Real *velocities = cells.velocities().data, *normals = cells.normals().data;
           Real* predicted = cells.predicted().data;
           const int vertices = cells.vertices();
+          if constexpr (requires { cells.held(); }) {
+            // v_pred belongs to the coupling points: what a force at the surface turns beyond them is a
+            // couple.
+            const auto at = cells.layout();
+#pragma omp parallel for schedule(static)
+            for (int c = 0; c < cells.count(); ++c)
+              for (int k = 0; k < vertices; ++k) {
+                const Node4<Real> F = contact_force_[group.marker(c, k)];
+                mesh::Vec3 arm;
+                for (int d = 0; d < 3; ++d)
+                  arm[d] = cells.offsets()[at.at(c, k, d)] - cells.held()[at.at(c, k, d)];
+                cells.add_couple(c, mesh::cross(arm, mesh::Vec3{F.x, F.y, F.z}));
+              }
+          }
 #pragma omp parallel for schedule(static)
           for (int b = 0; b < cells.batches(); ++b)
             for (int k = 0; k < vertices; ++k) {

@@ -25,7 +25,10 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
       continue;
     const data::Kind& k = scene_.cells.kinds[kind];
     mesh::TriangleMesh rest = make_mesh(k, units_.dx);
-    const std::vector<double> area = mesh::vertex_areas(rest);
+    const bool is_rigid = k.law == data::Kind::Law::rigid;
+    mesh::TriangleMesh held = rest;
+    if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling.retraction);
+    const std::vector<double> area = mesh::vertex_areas(held);
     const double excess = (k.density / units_.density - 1) * mesh::volume(rest) / rest.vertex_count();
     std::vector<double> mass(area.size(), excess), weight(area.size()), metric(area.size());
     for (std::size_t v = 0; v < area.size(); ++v) {
@@ -36,9 +39,8 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
           "cells.kinds." + k.name +
               ".density is too low (the implicit mass of a vertex is not positive) raise it or coupling.chi");
     }
-    const bool is_rigid = k.law == data::Kind::Law::rigid;
     auto make = [&]() -> std::variant<npfem::Membranes<Real>, rigid::RigidBodies<Real>> {
-      if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_});
+      if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_, held.vertices});
       return npfem::Membranes<Real>(
           std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
     };

@@ -1,7 +1,7 @@
 if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
-            verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
+            verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp verification/test_resolved_platelet.cpp
     LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
   add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)
@@ -9,7 +9,7 @@ if(TARGET hemowalk_resolved)
   target_include_directories(test_resolved_ranks PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   add_test(NAME test_resolved_ranks COMMAND ${MPIEXEC_EXECUTABLE} -n 3 --bind-to none $<TARGET_FILE:test_resolved_ranks>)
   set_tests_properties(test_resolved_ranks PROPERTIES LABELS verification TIMEOUT 300 ENVIRONMENT
-    "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMP_NUM_THREADS=1")
+    "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMP_NUM_THREADS=1")
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp

@@ -14,6 +14,7 @@ DeviceBodies<Real>::DeviceBodies(Queue& queue, const RigidBodies<Real>& host)
       count_(host.count()),
       gyration_(host.shape().gyration),
       arm_(make_array(queue.place(), host.shape().arm)),
+      held_(make_array(queue.place(), host.shape().held)),
       shape_normal_(make_array(queue.place(), host.shape().normal)),
       metric_(make_array(queue.place(), host.type().metric)) {
   const int pitch = mesh::CellFields<Real>::padded(host.vertices());
@@ -30,7 +31,8 @@ DeviceBodies<Real>::DeviceBodies(Queue& queue, const RigidBodies<Real>& host)
 template <class Real>
 typename DeviceBodies<Real>::Step DeviceBodies<Real>::body(const StepOptions&) const {
   auto* self = const_cast<DeviceBodies*>(this);  // the kernel writes through these pointers
-  return {fields_, gyration_, arm_.data(), shape_normal_.data(), metric_.data(), self->motion_.data()};
+  return {fields_,        gyration_,           arm_.data(), held_.data(), shape_normal_.data(),
+          metric_.data(), self->motion_.data()};
 }
 
 template <class Real>

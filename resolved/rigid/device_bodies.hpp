@@ -33,7 +33,7 @@ class DeviceBodies {
   int count_;
   mesh::CellFields<Real> fields_{};
   Gyration gyration_;
-  Array<Vec3> arm_, shape_normal_;
+  Array<Vec3> arm_, held_, shape_normal_;
   Array<double> metric_, anchor_;
   Array<BodyMotion> motion_;
   Array<Real> offset_, velocity_, normal_, predicted_;

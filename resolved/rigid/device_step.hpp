@@ -19,9 +19,9 @@ struct BodyStep {
   static constexpr int threads = 96, workers = 16;
   mesh::CellFields<Real> cells;
   Gyration gyration;
-  const Vec3 *arm, *normal;  ///< [vertices] body frame
-  const double* metric;      ///< [vertices]
-  BodyMotion* motion;        ///< [cell]
+  const Vec3 *arm, *held, *normal;  ///< [vertices] body frame: vertices, held points (BodyType), normals
+  const double* metric;             ///< [vertices]
+  BodyMotion* motion;               ///< [cell]
 
   /// The same for the bodies from \p first on.
   BodyStep from(std::size_t first) const {
@@ -59,7 +59,7 @@ struct BodyStep {
       const Vec3 p{metric[k] * static_cast<double>(v.x), metric[k] * static_cast<double>(v.y),
                    metric[k] * static_cast<double>(v.z)};
       mesh::accumulate(linear, 1, p);
-      mesh::accumulate(angular, 1, mesh::cross(mesh::transform(turn, arm[k]), p));
+      mesh::accumulate(angular, 1, mesh::cross(mesh::transform(turn, held[k]), p));
     }
     s.linear[me] = linear;
     s.angular[me] = angular;
@@ -85,7 +85,7 @@ struct BodyStep {
   HEMO_HD void move(unsigned cell, int me, const Shared& s) const {
     const Turn step(s.turn);
     for (int k = me; k < cells.vertices; k += threads) {
-      const auto chord = step.chord(mesh::transform(s.before, arm[k]));
+      const auto chord = step.chord(mesh::transform(s.before, held[k]));
       const auto r = mesh::transform(s.after, arm[k]), n = mesh::transform(s.after, normal[k]);
       for (int d = 0; d < 3; ++d) {
         const std::size_t i = cells.at(cell, d, k);

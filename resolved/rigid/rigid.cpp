@@ -31,6 +31,7 @@ Matrix3 inverse(const Matrix3& m) {
 
 Shape::Shape(const BodyType& type)
     : arm(type.rest.vertices),
+      held(type.held.empty() ? type.rest.vertices : type.held),
       normal(mesh::vertex_normals(type.rest)),
       area(mesh::vertex_areas(type.rest)),
       bounding_radius(mesh::bounding_radius(type.rest)),
@@ -39,16 +40,19 @@ Shape::Shape(const BodyType& type)
   require(type.metric.size() == arm.size(),
           "metric needs one mass per vertex (" + std::to_string(arm.size()) + " vertices, " +
               std::to_string(type.metric.size()) + " masses) pass m_k + k a_k for every vertex");
+  require(held.size() == arm.size(), "held needs one point per vertex (" + std::to_string(arm.size()) +
+                                         " vertices, " + std::to_string(held.size()) +
+                                         " points) leave it empty to hold the vertices");
   require(type.h > 0, "solid time step must be positive (a step moves by h v) give h > 0");
   for (std::size_t k = 0; k < arm.size(); ++k) {
     require(type.metric[k] > 0, "metric must be positive (m_k + k a_k) give the vertices mass or coupling");
     gyration.mass += type.metric[k];
-    mesh::accumulate(centre, type.metric[k], arm[k]);
+    mesh::accumulate(centre, type.metric[k], held[k]);
   }
   centre = mesh::scale(1 / gyration.mass, centre);
   for (std::size_t k = 0; k < arm.size(); ++k) {
-    arm[k] = mesh::subtract(arm[k], centre);
-    const auto& r = arm[k];
+    arm[k] = mesh::subtract(arm[k], centre), held[k] = mesh::subtract(held[k], centre);
+    const auto& r = held[k];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         gyration.inertia[3 * i + j] += type.metric[k] * ((i == j ? mesh::dot(r, r) : 0) - r[i] * r[j]);
@@ -67,9 +71,9 @@ struct RigidBodies<Real>::Impl {
   int capacity = 0;  ///< batches
   std::vector<std::int64_t> ids;
   std::vector<Quaternion> orientation;
-  std::vector<Vec3> velocity_of_centre, spin;
+  std::vector<Vec3> velocity_of_centre, spin, couple;
   Array<double> anchor;
-  Array<Real> offset, velocity, normal, predicted;
+  Array<Real> offset, held, velocity, normal, predicted;
 
   mesh::Layout<Real> layout() const { return {vertices}; }
 
@@ -84,13 +88,14 @@ struct RigidBodies<Real>::Impl {
     const int batches = (cells + lanes - 1) / lanes;
     if (batches <= capacity) return;
     const std::size_t fields = static_cast<std::size_t>(batches) * vertices * 3 * lanes;
-    for (auto* field : {&offset, &velocity, &normal, &predicted}) grow(*field, fields);
+    for (auto* field : {&offset, &held, &velocity, &normal, &predicted}) grow(*field, fields);
     grow(anchor, static_cast<std::size_t>(batches) * 3 * lanes);
     const std::size_t cells_now = static_cast<std::size_t>(batches) * lanes;
     ids.reserve(cells_now);
     orientation.resize(cells_now, mesh::identity_rotation);
     velocity_of_centre.resize(cells_now, Vec3{});
     spin.resize(cells_now, Vec3{});
+    couple.resize(cells_now, Vec3{});
     for (int c = capacity * lanes; c < batches * lanes; ++c) place(c);
     capacity = batches;
   }
@@ -99,9 +104,11 @@ struct RigidBodies<Real>::Impl {
   void place(int c) {
     const auto turn = mesh::matrix(orientation[c]);
     for (int k = 0; k < vertices; ++k) {
-      const auto r = mesh::transform(turn, shape.arm[k]), n = mesh::transform(turn, shape.normal[k]);
+      const auto r = mesh::transform(turn, shape.arm[k]), n = mesh::transform(turn, shape.normal[k]),
+                 s = mesh::transform(turn, shape.held[k]);
       for (int d = 0; d < 3; ++d) {
         offset[layout().at(c, k, d)] = static_cast<Real>(r[d]);
+        held[layout().at(c, k, d)] = static_cast<Real>(s[d]);
         normal[layout().at(c, k, d)] = static_cast<Real>(n[d]);
       }
     }
@@ -116,9 +123,10 @@ struct RigidBodies<Real>::Impl {
 
   void step(int c) {
     const auto turn = mesh::matrix(orientation[c]);
-    Vec3 linear{}, angular{};
+    Vec3 linear{}, angular = mesh::scale(type.h, couple[c]);
+    couple[c] = {};
     for (int k = 0; k < vertices; ++k) {
-      const auto r = mesh::transform(turn, shape.arm[k]);
+      const auto r = mesh::transform(turn, shape.held[k]);
       Vec3 p;
       for (int d = 0; d < 3; ++d)
         p[d] = type.metric[k] * static_cast<double>(predicted[layout().at(c, k, d)]);
@@ -133,7 +141,7 @@ struct RigidBodies<Real>::Impl {
   void move(int c, const Matrix3& turn) {
     const Turn step(mesh::scale(type.h, spin[c]));
     for (int k = 0; k < vertices; ++k) {
-      const auto chord = step.chord(mesh::transform(turn, shape.arm[k]));
+      const auto chord = step.chord(mesh::transform(turn, shape.held[k]));
       for (int d = 0; d < 3; ++d)
         velocity[layout().at(c, k, d)] = static_cast<Real>(velocity_of_centre[c][d] + chord[d] / type.h);
     }
@@ -204,7 +212,7 @@ void RigidBodies<Real>::remove(int c) {
     const auto put = [&](auto& list) { list[c] = list[last]; };
     put(impl_->ids), put(impl_->orientation), put(impl_->velocity_of_centre), put(impl_->spin);
     impl_->set_anchor(c, impl_->anchor_of(last));
-    for (auto* field : {&impl_->offset, &impl_->velocity, &impl_->normal, &impl_->predicted})
+    for (auto* field : {&impl_->offset, &impl_->held, &impl_->velocity, &impl_->normal, &impl_->predicted})
       for (int k = 0; k < vertices(); ++k)
         for (int d = 0; d < 3; ++d) (*field)[layout().at(c, k, d)] = (*field)[layout().at(last, k, d)];
   }
@@ -222,6 +230,14 @@ View<const double> RigidBodies<Real>::anchors() const {
 template <class Real>
 View<const Real> RigidBodies<Real>::offsets() const {
   return std::as_const(impl_->offset).view();
+}
+template <class Real>
+View<const Real> RigidBodies<Real>::held() const {
+  return std::as_const(impl_->held).view();
+}
+template <class Real>
+void RigidBodies<Real>::add_couple(int c, const Vec3& torque) {
+  mesh::accumulate(impl_->couple[c], 1, torque);
 }
 template <class Real>
 View<const Real> RigidBodies<Real>::velocities() const {
@@ -353,7 +369,7 @@ void RigidBodies<Real>::set_motion(int c, const Vec3& velocity, const Vec3& angu
   impl_->spin[c] = angular_velocity;
   const auto turn = mesh::matrix(impl_->orientation[c]);
   for (int k = 0; k < vertices(); ++k) {
-    const auto v = mesh::add(velocity, cross(angular_velocity, mesh::transform(turn, impl_->shape.arm[k])));
+    const auto v = mesh::add(velocity, cross(angular_velocity, mesh::transform(turn, impl_->shape.held[k])));
     for (int d = 0; d < 3; ++d) {
       impl_->velocity[layout().at(c, k, d)] = static_cast<Real>(v[d]);
       impl_->predicted[layout().at(c, k, d)] = 0;

@@ -24,6 +24,9 @@ struct BodyType {
       mass;  ///< m_k: own inertia, for diagnostics; the step sees it through v_pred and metric
   std::vector<double> metric;  ///< m_k + k a_k: the mass of the implicit step, > 0
   double h = 1;                ///< solid time step
+  /// Points of the body frame, one per vertex, where the surroundings hold it: metric, v_pred and velocities
+  /// belong to them. Empty: the vertices themselves.
+  std::vector<mesh::Vec3> held = {};
 };
 
 struct Shape;
@@ -58,13 +61,17 @@ class RigidBodies {
 
   View<const double> anchors() const;
   View<const Real> offsets() const;
-  View<const Real> velocities() const;
+  View<const Real> held() const;        ///< BodyType::held - anchor
+  View<const Real> velocities() const;  ///< of the held points
   View<const Real> normals() const;
   View<Real> predicted();
+  /// Torque about the anchor during the next step, beside what v_pred carries; forgotten after it.
+  void add_couple(int c, const mesh::Vec3& torque);
 
   /// Moves every body by h: V and omega such that sum metric (v - v_pred) = 0 and sum r^n x metric (v -
-  /// v_pred) = 0 with v = V + (exp(h omega) - 1) r^n/h, the chord velocity: x^{n+1} = x^n + h v holds as for
-  /// membranes, the shape stays exactly rigid and both momenta are conserved to round-off.
+  /// v_pred) = h couple with v = V + (exp(h omega) - 1) r^n/h, the chord velocity of the held points r:
+  /// x^{n+1} = x^n + h v holds as for membranes, the shape stays exactly rigid and both momenta are conserved
+  /// to round-off.
   StepReport step(const StepOptions& options = {});
 
   mesh::Vec3 anchor(int c) const;

@@ -8,12 +8,12 @@
 
 namespace hemowalk::rigid {
 
-/// Arms from the metric's centre in the body frame, inertia about it.
+/// Arms from the metric's centre in the body frame; inertia of the held points about it.
 struct Shape {
   explicit Shape(const BodyType& type);
 
-  std::vector<Vec3> arm, normal;  ///< body frame
-  Vec3 centre{};                  ///< of the metric, in the frame of type.rest
+  std::vector<Vec3> arm, held, normal;  ///< body frame: vertices, held points
+  Vec3 centre{};                        ///< of the metric, in the frame of type.rest
   Gyration gyration;
   std::vector<double> area;
   double bounding_radius = 0, volume = 0;

@@ -61,6 +61,42 @@ TEST(RigidBodies, KeepTheMomentaOfAnyVelocityAndMoveByTheirVelocity) {
   }
 }
 
+/// Held at points away from its vertices: momenta and velocities are those of the points, a couple turns it.
+TEST(RigidBodies, HeldPointsCarryTheMomentaAndACoupleAddsItself) {
+  auto type = uneven_body();
+  type.held = type.rest.vertices;
+  for (auto& p : type.held) p = {0.5 * p[0], 0.7 * p[1], 0.8 * p[2]};
+  RigidBodies<double> bodies(type);
+  bodies.add(1, {5, 6, 7}, mesh::rotation({1, 1, 0}, 0.5));
+  support::Numbers numbers(9);
+  const Vec3 torque{3, -2, 1};
+  for (int i = 0; i < 5; ++i) {
+    const auto held = [&](int k) {
+      Vec3 x = bodies.anchor(0);
+      for (int d = 0; d < 3; ++d) x[d] += bodies.held()[bodies.layout().at(0, k, d)];
+      return x;
+    };
+    std::vector<Vec3> x(bodies.vertices()), w(bodies.vertices());
+    for (int k = 0; k < bodies.vertices(); ++k) x[k] = held(k), w[k] = {1 + numbers(), numbers(), numbers()};
+    const Vec3 anchor = bodies.anchor(0);
+    predict(bodies, 0, w);
+    if (i == 0) bodies.add_couple(0, torque);
+    bodies.step();
+    const auto v = velocities(bodies, 0);
+    Vec3 linear{}, angular{};
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      const auto gap = mesh::subtract(v[k], w[k]);
+      mesh::accumulate(linear, type.metric[k], gap);
+      mesh::accumulate(angular, type.metric[k], mesh::cross(mesh::subtract(x[k], anchor), gap));
+      const auto moved = held(static_cast<int>(k));
+      EXPECT_NEAR(mesh::norm(mesh::subtract(moved, mesh::add(x[k], mesh::scale(type.h, v[k])))), 0, 1e-13);
+    }
+    EXPECT_LT(mesh::norm(linear), 1e-12);
+    const Vec3 expected = i == 0 ? mesh::scale(type.h, torque) : Vec3{};  // forgotten after its step
+    EXPECT_LT(mesh::norm(mesh::subtract(angular, expected)), 1e-11);
+  }
+}
+
 /// Free flight of an asymmetric top: angular momentum to round-off, energy with an error of second order in
 /// h.
 TEST(RigidBodies, FreeTopKeepsItsAngularMomentum) {

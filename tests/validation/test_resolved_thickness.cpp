@@ -1,104 +1,123 @@
-// Hydrodynamic thickness of the coupling (method 5.2): free rotation and drag of a sphere, Jeffery orbit of a
-// platelet, friction of two sheets, for the shipped retraction and its neighbours. Prints the table of
-// docs/evidence/resolved.md.
+// Hydrodynamic thickness of the coupling (method 5.2): free rotation and drag of a sphere, Jeffery period and
+// drag of a rigid platelet, friction of two sheets; over the retraction, and over dx. Prints the tables of
+// docs/evidence/validation.md.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdio>
 
-#include "resolved/simulation.hpp"
 #include "support/sheets.hpp"
+#include "support/single_body.hpp"
 
 namespace hemowalk::resolved {
 namespace {
 
-data::Scene body_scene(double box, double retraction, data::Shape shape, int subdivision) {
-  data::Scene scene;
-  scene.domain.size = {box, box, box};
-  scene.coupling.retraction = retraction;
-  scene.flow.walls = data::Flow::Walls::both;
-  data::Kind kind;
-  kind.name = "body", kind.shape = shape, kind.subdivision = subdivision, kind.law = data::Kind::Law::rigid;
-  scene.cells.kinds = {kind};
-  return scene;
+using test::BodyCase;
+
+const mesh::Vec3 platelet_radii{1.8, 0.55, 1.8};  // um; Jeffery: 22.5 with the aspect ratio 3.27
+constexpr double exact_period = 22.5;
+
+BodyCase sphere_case(double retraction) {
+  BodyCase c;
+  c.shape = test::sphere_shape(2.5), c.subdivision = 5, c.box = 14, c.offset = {0.3, 0.1, 0};
+  c.coupling.retraction = retraction;
+  return c;
 }
 
-data::Shape sphere(double radius) {
-  data::Shape shape;
-  shape.type = data::Shape::Type::sphere, shape.radii = {radius, radius, radius};
-  return shape;
-}
+struct Platelet {
+  double period = 0, broadside = 0, edgewise = 0;  // times shear rate; drags over their exact values
+};
 
-/// Angular velocity over shear rate of a free sphere of 5 dx between walls 28 dx apart, after a strain
-/// of 1.5.
-double sphere_rotation(double retraction) {
-  data::Scene scene = body_scene(14e-6, retraction, sphere(2.5e-6), 5);
-  scene.acceleration = 20;
-  Simulation<float> sim(scene, {{0, {14.3, 14, 14}, mesh::identity_rotation, {}}});
-  const double rate = sim.units().rate(100);
-  for (int i = 0; i < 1.5 / rate; ++i) sim.step();
-  return std::get<rigid::RigidBodies<float>>(sim.groups()[0].cells).angular_velocity(0)[0] / rate;
-}
-
-/// Radius, in dx, that Stokes drag in a periodic box (Hasimoto 1959) gives a sphere of 5 dx.
-double sphere_drag_radius(double retraction) {
-  data::Scene scene = body_scene(14e-6, retraction, sphere(2.5e-6), 5);
-  scene.domain.geometry = data::Domain::Geometry::periodic;
-  scene.flow.type = data::Flow::Type::rest;
-  scene.cells.kinds[0].density = scene.fluid.density;
-  scene.cells.loads = {{0, "+z", 1.0, {0, 0, 2e-12}}};
-  Simulation<double> sim(scene, {{0, {14.3, 14.1, 14}, mesh::identity_rotation, {}}});
-  const double n = 28, viscosity = 0.5, force = sim.units().force(2e-12);
-  for (int i = 0; i < 480; ++i) sim.step();
-  const Momentum m = sim.momentum();
-  const double mean = (m.fluid[2] + m.cells[2]) / (n * n * n);
-  const double speed = std::get<rigid::RigidBodies<double>>(sim.groups()[0].cells).velocity(0)[2] - mean;
-  double a = 5;
-  for (int i = 0; i < 100; ++i) {
-    const double c = a / n;
-    a = force / (6 * M_PI * viscosity * speed) * (1 - 2.8373 * c + 4.19 * c * c * c - 27.4 * std::pow(c, 6));
+// Mean over places of the platelet on the lattice.
+Platelet platelet(BodyCase c, int places) {
+  c.shape = test::platelet_shape();
+  Platelet p;
+  for (int i = 0; i < places; ++i) {
+    c.offset = {0.3 * i, static_cast<double>(i) / places, 0.15 * i};
+    p.period += test::jeffery_period(c) / places;
+    p.broadside += test::stokes_radius(c, 1) / test::exact_stokes_radius(platelet_radii, 1) / places;
+    p.edgewise += test::stokes_radius(c, 0) / test::exact_stokes_radius(platelet_radii, 0) / places;
   }
-  return a;
+  return p;
 }
 
-/// Jeffery period times shear rate of a rigid platelet, from the time of its first quarter turn.
-double platelet_period(double retraction) {
-  data::Shape shape;
-  shape.type = data::Shape::Type::platelet;
-  data::Scene scene = body_scene(12e-6, retraction, shape, 4);
-  scene.acceleration = 50;
-  Simulation<float> sim(scene, {{0, {12, 12, 12}, mesh::identity_rotation, {}}});
-  const double rate = sim.units().rate(100);
-  for (int i = 1; i < 20 / rate; ++i) {
-    sim.step();
-    if (i % 10) continue;
-    const auto axis = std::get<rigid::RigidBodies<float>>(sim.groups()[0].cells).observe(0).axis;
-    if (axis[1] < 0) return 4 * i * rate;
-  }
-  return std::nan("");
+TEST(ExactDrag, OfASphereAndOfADisc) {
+  EXPECT_NEAR(test::exact_stokes_radius({2, 2, 2}, 0), 2, 1e-6);
+  // Disc: 16 mu a U broadside, 32/3 mu a U edgewise; first order in the thickness.
+  EXPECT_NEAR(test::exact_stokes_radius({1, 1e-4, 1}, 1), 16 / (6 * M_PI), 1e-3);
+  EXPECT_NEAR(test::exact_stokes_radius({1, 1e-4, 1}, 0), 32.0 / 3 / (6 * M_PI), 1e-3);
 }
 
-TEST(HydrodynamicThickness, TableOverRetraction) {
-  const double shipped = data::Coupling{}.retraction, free_rotation = sphere_rotation(0);
+TEST(HydrodynamicThickness, OverRetraction) {
+  const double shipped = data::Coupling{}.retraction, free_rotation = test::rotation_rate(sphere_case(0));
   std::printf(
-      "retraction/dx  omega/gamma  drag radius/dx (5)  platelet period gamma (22.5)  friction at gap 1, 2, 4 "
-      "dx\n");
+      "retraction  sphere: omega/gamma, drag | platelet: period gamma, drag broadside, edgewise | friction "
+      "at "
+      "1, 2, 4 dx\n");
   for (const double retraction : {0.0, 0.4, 0.5, 0.6, 0.7}) {
-    const double rotation = sphere_rotation(retraction), period = platelet_period(retraction);
-    const double radius = retraction > 0 ? sphere_drag_radius(retraction) : std::nan("");
-    std::printf("%12.2f  %11.4f  %18.3f  %28.2f ", retraction, rotation, radius, period);
+    const double rotation = test::rotation_rate(sphere_case(retraction)),
+                 radius = test::stokes_radius(sphere_case(retraction), 2) / 2.5;
+    BodyCase c;
+    c.coupling.retraction = retraction;
+    const Platelet p = platelet(c, 4);
+    std::printf("%10.2f  %.4f %.3f | %.2f %.3f %.3f |", retraction, rotation, radius, p.period, p.broadside,
+                p.edgewise);
     for (const double gap : {1.0, 2.0, 4.0}) {
-      test_support::SheetCase c;
-      c.gap = gap, c.retraction = retraction;
-      std::printf(" %6.3f", test_support::relative_friction(c));
+      test_support::SheetCase s;
+      s.gap = gap, s.retraction = retraction;
+      std::printf(" %.3f", test_support::relative_friction(s));
     }
     std::printf("\n");
     // Objectivity: however far the surface is drawn back, a sphere turns with the fluid.
     EXPECT_NEAR(rotation / free_rotation, 1, 0.02) << retraction;
     if (retraction != shipped) continue;
-    EXPECT_NEAR(radius, 5, 0.1);
-    EXPECT_NEAR(period / 22.5, 1, 0.12);
+    EXPECT_NEAR(radius, 1, 0.02);
+    EXPECT_NEAR(p.period / exact_period, 1, 0.05);
+    EXPECT_NEAR(p.broadside, 1, 0.05);
+    EXPECT_NEAR(p.edgewise, 1, 0.05);
   }
+}
+
+TEST(HydrodynamicThickness, OverLatticeSpacing) {
+  std::printf("dx/um  n | platelet: period gamma, drag broadside, edgewise (retraction %.2f)\n",
+              data::Coupling{}.retraction);
+  const struct {
+    double dx;
+    int n, places;
+  } levels[] = {{0.5, 4, 4}, {1.0 / 3, 6, 2}, {0.25, 8, 1}};
+  for (const auto& level : levels) {
+    BodyCase c;
+    c.dx = level.dx, c.subdivision = level.n;
+    const Platelet p = platelet(c, level.places);
+    std::printf("%.3f  %d | %.2f %.3f %.3f\n", level.dx, level.n, p.period, p.broadside, p.edgewise);
+    // Known: at 1/3 um the period is about a tenth short; docs/evidence/validation.md says why.
+    EXPECT_NEAR(p.period / exact_period, 1, level.dx == 1.0 / 3 ? 0.12 : 0.05) << level.dx;
+    EXPECT_NEAR(p.broadside, 1, 0.05) << level.dx;
+    EXPECT_NEAR(p.edgewise, 1, 0.05) << level.dx;
+  }
+}
+
+// Whole orbits, at the acceleration of production runs: the time from one quarter turn to the fifth.
+TEST(HydrodynamicThickness, WholeOrbits) {
+  BodyCase c;
+  c.shape = test::platelet_shape(), c.acceleration = 50;
+  Simulation<float> sim(test::scene_of(c), {test::body_of(c)});
+  const double rate = sim.units().rate(100);
+  double first = 0, last = 0, before = 1;
+  int crossings = 0;
+  for (int i = 1; i < 40 / rate; ++i) {
+    sim.step();
+    const double now = std::get<rigid::RigidBodies<float>>(sim.groups()[0].cells).observe(0).axis[1];
+    if (now * before < 0) {
+      last = i * rate;
+      if (crossings++ == 0) first = last;
+    }
+    before = now;
+  }
+  ASSERT_GE(crossings, 3);
+  const double period = 2 * (last - first) / (crossings - 1);
+  std::printf("whole orbits at acceleration 50: period gamma %.2f (%d half turns)\n", period, crossings - 1);
+  EXPECT_NEAR(period / exact_period, 1, 0.05);
 }
 
 }  // namespace
