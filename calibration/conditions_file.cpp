@@ -104,6 +104,7 @@ void carry_profile(data::TransportLaw& law, const data::TransportLaw::Profile& f
   auto& to = law.profile;
   to = {};
   if (from.y.empty()) return;
+  if (!std::isfinite(gap)) gap = from.y.back() - from.y.front();
   const std::size_t n = from.y.size();
   const double low = from.y.front(), high = from.y.back(), half = (high - low) / 2;
   const auto carried = [&](const std::vector<double>& f, bool drift) {
@@ -146,6 +147,11 @@ data::TransportLaw law_at(const ConditionFit& fit, const Laws& laws, const Condi
     p.log_D += fit.shear_exponent * step;
     if (step != 0) p.sigma = std::hypot(p.sigma, fit.shear_exponent_sigma * step);
   }
+  if (!std::isfinite(p.log_D) || !std::isfinite(p.sigma))
+    throw Refused(
+        "no D with an error can be given there (a calibration does not state its shear rate, or its "
+        "exponent's "
+        "error) complete the conditions of the laws");
   data::TransportLaw law = nearest(fit, laws, at);
   const auto source = law.profile;
   law.conditions = at;

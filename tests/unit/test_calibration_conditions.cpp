@@ -162,6 +162,23 @@ TEST(LawAtConditions, RefusesWhatWasNotCalibrated) {
   EXPECT_NEAR(law_at(fit, laws, at).core.D, 1e-10 * std::pow(1.5, -0.1), 1e-16);
 }
 
+// Laws written by hand may leave out the gap or the shear rate.
+TEST(LawAtConditions, UnknownConditionsAreNoGuess) {
+  auto laws = over_kappa(-0.1, 1e-11);
+  for (auto& l : laws) {
+    l.conditions.gap = unknown;
+    l.profile.y = {0, 25e-6, 50e-6};
+    l.profile.D = {1e-10, 1e-10, 1e-10};
+    l.profile.v = {0, 0, 0};
+    l.core.y_range = {10e-6, 40e-6};
+  }
+  EXPECT_EQ(law_at(fit_conditions(laws), laws, anywhere).profile.y.back(), 50e-6);
+  for (auto& l : laws) l.conditions.shear_rate = unknown;
+  auto at = anywhere;
+  at.shear_rate = 150;
+  EXPECT_THROW(law_at(fit_conditions(laws), laws, at), Refused);
+}
+
 TEST(LawAtConditions, ProfileKeepsItsDistanceToTheWalls) {
   std::vector<data::TransportLaw> laws{law_at(100, 0.35, 0.9, 1e-10, 1e-12),
                                        law_at(100, 0.35, 0.9, 2e-10, 2e-12)};
@@ -188,9 +205,12 @@ TEST(LawAtConditions, ProfileKeepsItsDistanceToTheWalls) {
   for (std::size_t k = 0; k < law.profile.y.size(); ++k) {
     const double d = std::min(law.profile.y[k], 100e-6 - law.profile.y[k]);
     // Linear tables of 0.8 (50 um) and 3.1 um (200 um) knots: the kink at 10 um is rounded by half a knot.
-    if (std::abs(d - 10e-6) > 3.2e-6)
+    if (std::abs(d - 10e-6) > 3.2e-6) {
       EXPECT_NEAR(law.profile.D[k], D * std::min(1.0, d / 10e-6), 0.002 * D) << k;
-    if (d > 14e-6) EXPECT_EQ(law.profile.v[k], 0) << k;
+    }
+    if (d > 14e-6) {
+      EXPECT_EQ(law.profile.v[k], 0) << k;
+    }
   }
   EXPECT_GT(law.profile.v[2], 0);
   EXPECT_LT(law.profile.v[62], 0);
