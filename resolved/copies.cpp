@@ -54,7 +54,8 @@ void Copies<Real>::set_bodies(std::vector<contact::Body> own, std::size_t slots)
 template <class Real>
 void Copies<Real>::arrange() {
   body_of_.assign(own_body_of_.begin(), own_body_of_.end());
-  for (const Neighbour& n : sides_) {
+  for (Neighbour& n : sides_) {
+    index(n);
     const std::uint8_t* away = n.away.data();
     for (const std::uint32_t b : n.listed)
       for (int k = 0; k < vertices_[bodies_[b].shape]; ++k)
@@ -83,20 +84,22 @@ double Copies<Real>::need(const Neighbour& n) const {
 template <class Real>
 bool Copies<Real>::strayed(Side side, View<const ibm::Origin> origin, View<const Node4<Real>> sites) const {
   const Neighbour& n = sides_[index_of(side)];
-  std::size_t at = 0;
-  for (const std::uint32_t b : n.listed) {
+  bool any = false;
+#pragma omp parallel for schedule(static) reduction(|| : any)
+  for (std::size_t i = 0; i < n.listed.size(); ++i) {
+    const std::uint32_t b = n.listed[i];
     const contact::Body& body = bodies_[b];
+    const std::uint8_t* away = n.away.data() + n.own.vertex[i];
     const int vertices = vertices_[body.shape], z = origin[b][2];
     int stray = 0;
     for (int k = 0; k < vertices; ++k) {
       const int node = node_of(z, sites[body.first + k * body.stride].z);
       const int inside = side == Side::low ? node : block_.nz - 1 - node;  // negative: beyond the border
-      stray |= n.away[at + k] ? inside > straying - 1 : inside < -straying;
+      stray |= away[k] ? inside > straying - 1 : inside < -straying;
     }
-    if (stray) return true;
-    at += vertices;
+    any = any || stray;
   }
-  return false;
+  return any;
 }
 
 /// Decides what the neighbour gets. \returns as Head::lists.
@@ -127,6 +130,7 @@ int Copies<Real>::choose(Side side, View<const Extent> extents, View<const ibm::
     for (int k = 0; k < vertices_[body.shape]; ++k)
       n.away.push_back(is_away(side, node_of(origin[b][2], sites[body.first + k * body.stride].z)));
   }
+  index(n);
   return unlisted ? 2 : 1;
 }
 
@@ -137,8 +141,7 @@ void Copies<Real>::pack(Side side, int lists, View<const Extent> extents, View<c
   Head head{lists,     static_cast<std::int32_t>(n.listed.size()), static_cast<std::int32_t>(n.away.size()),
             n.leaving, -std::numeric_limits<double>::infinity(),   0};
   for (std::size_t b = 0; b < own_; ++b) head.reach = std::max(head.reach, -depth(side, extents[b]));
-  std::size_t away = 0;
-  for (const std::uint8_t there : n.away) away += there;
+  const std::size_t away = n.own.beyond.back();
   const std::size_t shapes = lists ? aligned(2 * n.listed.size()) + aligned(n.away.size()) : 0,
                     origins = aligned(n.listed.size() * sizeof(ibm::Origin)),
                     reals = 3 * ((range_ < 0 ? 0 : n.away.size()) + away);
@@ -160,23 +163,63 @@ void Copies<Real>::pack(Side side, int lists, View<const Extent> extents, View<c
     std::memcpy(out + i * sizeof o, &o, sizeof o);
   }
   auto* real = reinterpret_cast<Real*>(out + origins);
-  const auto put = [&real](const Node4<Real>& v) { *real++ = v.x, *real++ = v.y, *real++ = v.z; };
-  if (range_ >= 0)
-    for (const std::uint32_t b : n.listed)
-      for (int k = 0; k < vertices_[bodies_[b].shape]; ++k)
-        put(vertices[bodies_[b].first + k * bodies_[b].stride]);
-  for_own(n, [&](std::size_t slot) { put(sites[slot]); });
+  const auto put = [](Real* to, const Node4<Real>& v) { to[0] = v.x, to[1] = v.y, to[2] = v.z; };
+  if (range_ >= 0) {
+#pragma omp parallel for schedule(static)
+    for (std::size_t i = 0; i < n.listed.size(); ++i) {
+      const contact::Body& body = bodies_[n.listed[i]];
+      for (int k = 0; k < vertices_[body.shape]; ++k)
+        put(real + 3 * (n.own.vertex[i] + k), vertices[body.first + k * body.stride]);
+    }
+    real += 3 * n.away.size();
+  }
+  for_own(n, [&](std::size_t slot, std::size_t at) { put(real + 3 * at, sites[slot]); });
 }
 
-/// body(slot) for every own marker that lies with the neighbour, in the order in which it knows them.
+template <class Real>
+void Copies<Real>::index(Neighbour& n) const {
+  const auto count = [](Begin& begin, std::size_t bodies, const std::uint8_t* beyond,
+                        const auto& vertices_of) {
+    begin.vertex.assign(1, 0), begin.beyond.assign(1, 0);
+    for (std::size_t i = 0; i < bodies; ++i) {
+      const int vertices = vertices_of(i);
+      std::uint32_t sum = 0;
+      for (int k = 0; k < vertices; ++k) sum += *beyond++;
+      begin.vertex.push_back(begin.vertex.back() + vertices);
+      begin.beyond.push_back(begin.beyond.back() + sum);
+    }
+  };
+  count(n.own, n.listed.size(), n.away.data(),
+        [&](std::size_t i) { return vertices_[bodies_[n.listed[i]].shape]; });
+  count(n.copy, n.shapes.size(), n.here.data(), [&](std::size_t i) { return vertices_[n.shapes[i]]; });
+}
+
+/// body(slot, i) for every own marker that lies with the neighbour, the i-th in the order in which both know
+/// them.
 template <class Real>
 template <class Body>
 void Copies<Real>::for_own(const Neighbour& n, const Body& body) const {
-  const std::uint8_t* away = n.away.data();
-  for (const std::uint32_t b : n.listed) {
-    const contact::Body& own = bodies_[b];
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < n.listed.size(); ++i) {
+    const contact::Body& own = bodies_[n.listed[i]];
+    const std::uint8_t* away = n.away.data() + n.own.vertex[i];
+    std::size_t at = n.own.beyond[i];
+    if (at == n.own.beyond[i + 1]) continue;
     for (int k = 0; k < vertices_[own.shape]; ++k)
-      if (*away++) body(own.first + k * own.stride);
+      if (away[k]) body(own.first + k * own.stride, at++);
+  }
+}
+
+/// body(slot, i) for every copied marker that lies here, the i-th likewise.
+template <class Real>
+template <class Body>
+void Copies<Real>::for_copies(const Neighbour& n, const Body& body) const {
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < n.shapes.size(); ++i) {
+    std::size_t at = n.copy.beyond[i];
+    if (at == n.copy.beyond[i + 1]) continue;
+    for (std::uint32_t m = n.copy.vertex[i]; m < n.copy.vertex[i + 1]; ++m)
+      if (n.here[m]) body(n.first_slot + m, at++);
   }
 }
 
@@ -260,18 +303,20 @@ void Copies<Real>::check_reach() const {
 template <class Real>
 void Copies<Real>::place(View<ibm::Origin> origin, View<Node4<Real>> vertices,
                          View<Node4<Real>> sites) const {
+  if (!decomposition_.divided()) return;
   for (const Neighbour& n : sides_) {
     const std::byte* in = n.incoming.data() + n.incoming_at;
     if (!n.shapes.empty()) std::memcpy(&origin[n.first_body], in, n.shapes.size() * sizeof(ibm::Origin));
     const auto* real = reinterpret_cast<const Real*>(in + aligned(n.shapes.size() * sizeof(ibm::Origin)));
-    if (range_ >= 0)
-      for (std::size_t m = 0; m < n.here.size(); ++m, real += 3)
-        vertices[n.first_slot + m] = {real[0], real[1], real[2], Real(0)};
-    for (std::size_t m = 0; m < n.here.size(); ++m)
-      if (n.here[m]) {
-        sites[n.first_slot + m] = {real[0], real[1], real[2], Real(0)};
-        real += 3;
-      }
+    if (range_ >= 0) {
+#pragma omp parallel for schedule(static)
+      for (std::size_t m = 0; m < n.here.size(); ++m)
+        vertices[n.first_slot + m] = {real[3 * m], real[3 * m + 1], real[3 * m + 2], Real(0)};
+      real += 3 * n.here.size();
+    }
+    for_copies(n, [&](std::size_t slot, std::size_t at) {
+      sites[slot] = {real[3 * at], real[3 * at + 1], real[3 * at + 2], Real(0)};
+    });
   }
 }
 
@@ -280,15 +325,11 @@ void Copies<Real>::send_readings(View<const Node4<Real>> reading) {
   if (!decomposition_.divided()) return;
   for (const Side side : both_sides) {
     Neighbour& n = sides_[index_of(side)];
-    n.back.clear();
-    for (std::size_t m = 0; m < n.here.size(); ++m)
-      if (n.here[m]) {
-        const Node4<Real>& v = reading[n.first_slot + m];
-        n.back.insert(n.back.end(), {v.x, v.y, v.z});
-      }
-    std::size_t away = 0;
-    for (const std::uint8_t there : n.away) away += there;
-    n.there.resize(3 * away);
+    n.back.resize(3 * n.copy.beyond.back()), n.there.resize(3 * n.own.beyond.back());
+    for_copies(n, [&](std::size_t slot, std::size_t at) {
+      const Node4<Real>& v = reading[slot];
+      n.back[3 * at] = v.x, n.back[3 * at + 1] = v.y, n.back[3 * at + 2] = v.z;
+    });
     readings_.receive(side, n.there.data(), n.there.size());
     readings_.send(side, n.back.data(), n.back.size());
   }
@@ -298,10 +339,10 @@ template <class Real>
 void Copies<Real>::receive_readings(View<Node4<Real>> reading) {
   if (!decomposition_.divided()) return;
   readings_.wait();
-  for (const Neighbour& n : sides_) {
-    const Real* in = n.there.data();
-    for_own(n, [&](std::size_t slot) { reading[slot] = {in[0], in[1], in[2], Real(0)}, in += 3; });
-  }
+  for (const Neighbour& n : sides_)
+    for_own(n, [&](std::size_t slot, std::size_t at) {
+      reading[slot] = {n.there[3 * at], n.there[3 * at + 1], n.there[3 * at + 2], Real(0)};
+    });
 }
 
 template <class Real>
@@ -309,13 +350,11 @@ void Copies<Real>::send_impulses(View<const Node4<Real>> impulse) {
   if (!decomposition_.divided()) return;
   for (const Side side : both_sides) {
     Neighbour& n = sides_[index_of(side)];
-    n.there.clear();
-    for_own(n, [&](std::size_t slot) {
-      n.there.insert(n.there.end(), {impulse[slot].x, impulse[slot].y, impulse[slot].z});
+    n.there.resize(3 * n.own.beyond.back()), n.back.resize(3 * n.copy.beyond.back());
+    for_own(n, [&](std::size_t slot, std::size_t at) {
+      const Node4<Real>& v = impulse[slot];
+      n.there[3 * at] = v.x, n.there[3 * at + 1] = v.y, n.there[3 * at + 2] = v.z;
     });
-    std::size_t here = 0;
-    for (const std::uint8_t mine : n.here) here += mine;
-    n.back.resize(3 * here);
     impulses_.receive(side, n.back.data(), n.back.size());
     impulses_.send(side, n.there.data(), n.there.size());
   }
@@ -325,11 +364,10 @@ template <class Real>
 void Copies<Real>::receive_impulses(View<Node4<Real>> impulse) {
   if (!decomposition_.divided()) return;
   impulses_.wait();
-  for (const Neighbour& n : sides_) {
-    const Real* in = n.back.data();
-    for (std::size_t m = 0; m < n.here.size(); ++m)
-      if (n.here[m]) impulse[n.first_slot + m] = {in[0], in[1], in[2], Real(0)}, in += 3;
-  }
+  for (const Neighbour& n : sides_)
+    for_copies(n, [&](std::size_t slot, std::size_t at) {
+      impulse[slot] = {n.back[3 * at], n.back[3 * at + 1], n.back[3 * at + 2], Real(0)};
+    });
 }
 
 template <class Real>
@@ -388,6 +426,15 @@ void Copies<Real>::load(View<const std::byte> state) {
     for (const std::uint32_t b : n.listed) on_list_[index_of(side)][b] = 1;
   }
   arrange();
+}
+
+template <class Real>
+std::size_t Copies<Real>::bytes_per_step() const {
+  if (!decomposition_.divided()) return 0;
+  std::size_t bytes = 0;
+  for (const Neighbour& n : sides_)
+    bytes += n.outgoing.size() + (n.own.beyond.back() + n.copy.beyond.back()) * 3 * sizeof(Real);
+  return bytes;
 }
 
 template <class Real>

@@ -67,14 +67,22 @@ class Copies {
   std::vector<std::byte> save() const;
   void load(View<const std::byte> state);
 
+  /// What this rank sent in the last step: positions, readings, impulses.
+  std::size_t bytes_per_step() const;
   std::size_t memory_bytes() const;
 
  private:
+  /// Where each body of a list begins, among the list's vertices and among its markers that lie beyond the
+  /// border; one more entry for the end.
+  struct Begin {
+    std::vector<std::uint32_t> vertex, beyond;
+  };
   struct Neighbour {
     std::vector<std::uint32_t> listed;  ///< own bodies it has copies of
     std::vector<std::uint8_t> away;     ///< [their vertices in turn] 1: the marker lies there
     std::vector<std::uint16_t> shapes;  ///< of its bodies that are copied here
     std::vector<std::uint8_t> here;     ///< [their vertices in turn] 1: the marker lies here
+    Begin own, copy;                    ///< of `listed` and `shapes`
     double reach = 0;                   ///< how far its surfaces come into this block
     bool leaving = false, arriving = false;
     std::size_t first_body = 0, first_slot = 0;  ///< of the copies
@@ -100,8 +108,11 @@ class Copies {
   int unpack_lists(Neighbour& n);
   void check_reach() const;
   void arrange();
+  void index(Neighbour& n) const;
   template <class Body>
   void for_own(const Neighbour& n, const Body& body) const;
+  template <class Body>
+  void for_copies(const Neighbour& n, const Body& body) const;
 
   static constexpr double margin = 2;  ///< dx by which lists look ahead
 

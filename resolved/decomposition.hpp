@@ -93,9 +93,13 @@ class FieldExchange {
   /// Populations that cross the borders, between begin_advance() and end_advance().
   void stream(lbm::Fluid<Real>& fluid);
 
+  /// Planes that fill() sends, and fold().
+  static constexpr int planes_sent = 5;
+
  private:
-  // A kernel reaches two planes below a marker's node and three above; markers may be one node outside.
+  // A marker may be one node outside; its kernel reaches from one node below its own to two above.
   static constexpr int below = 2, above = 3;
+  static_assert(below + above == planes_sent);
   View<Node4<Real>> planes(View<Node4<Real>> field, int first, int count) const;
 
   bool divided_;

@@ -587,6 +587,15 @@ double Simulation<Real>::slip_rms() {
 }
 
 template <class Real>
+std::size_t Simulation<Real>::bytes_per_step() const {
+  if (!decomposition_.divided()) return 0;
+  const std::size_t planes =
+      any_cells_ ? 2 * FieldExchange<Real>::planes_sent : FieldExchange<Real>::planes_sent;
+  return copies_->bytes_per_step() + planes * block_.plane() * sizeof(Node4<Real>) +
+         2 * scene_.coupling.solid_every * fluid_.border_size() * sizeof(Real);
+}
+
+template <class Real>
 std::size_t Simulation<Real>::memory_bytes() const {
   return fluid_.memory_bytes() +
          (velocity_.size() + force_.size() + 5 * vertices_.size() + force_reading_.size()) *

@@ -127,6 +127,8 @@ class Simulation {
   std::size_t memory_bytes() const;
   /// Markers that this rank interpolates and spreads.
   std::size_t markers() const { return markers_->active(); }
+  /// What this rank sends to its neighbours in a step.
+  std::size_t bytes_per_step() const;
   /// Cells that came to this rank from another since the start.
   std::int64_t arrivals() const { return arrivals_; }
 

@@ -8,8 +8,12 @@ if(TARGET hemowalk_resolved)
   target_link_libraries(test_resolved_ranks PRIVATE hemowalk_resolved GTest::gtest)
   target_include_directories(test_resolved_ranks PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   add_test(NAME test_resolved_ranks COMMAND ${MPIEXEC_EXECUTABLE} -n 3 --bind-to none $<TARGET_FILE:test_resolved_ranks>)
-  set_tests_properties(test_resolved_ranks PROPERTIES LABELS verification TIMEOUT 300 ENVIRONMENT
+  set_tests_properties(test_resolved_ranks PROPERTIES LABELS verification TIMEOUT 600 ENVIRONMENT
     "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMP_NUM_THREADS=1")
+  # Run by hand, with mpirun: docs/evidence/scaling.md.
+  add_executable(bench_ranks benchmarks/bench_ranks.cpp)
+  target_link_libraries(bench_ranks PRIVATE hemowalk_resolved)
+  target_include_directories(bench_ranks PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp

@@ -41,6 +41,10 @@ std::vector<InitialCell> crowd() {
           {0, {12, 13, 37}, mesh::rotation({0, 0, 1}, 0.1), {}},
           {0, {11, 9, 58}, mesh::rotation({1, 0, 0}, -0.2), {}},
           {1, {12, 17, 30.4}, mesh::rotation({0, 0, 1}, 0.1), {}},
+          {1,
+           {15.3, 12.5, 26.9},
+           mesh::rotation({1, 0, 0}, 1.5708),
+           {}},  // upright, at the rim of the second cell
           {1, {12, 25.9, 40.2}, mesh::rotation({0, 0, 1}, 0.2), {}}};
 }
 
