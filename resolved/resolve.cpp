@@ -18,6 +18,7 @@
 #include "resolved/packing.hpp"
 #include "resolved/recorder.hpp"
 #include "resolved/simulation.hpp"
+#include "resolved/stepper.hpp"
 #include "resolved/surface_output.hpp"
 
 namespace hemowalk::resolved {
@@ -67,14 +68,17 @@ class Run {
     if (schedule_.surface > 0) surfaces_ = make_surfaces();
     if (first == 0) outputs(0);
     double last_checkpoint = omp_get_wtime();
-    while (simulation_.fluid_steps() < schedule_.end) {
-      simulation_.step();
-      const std::int64_t step = simulation_.fluid_steps();
+    Stepper<Real> stepper(simulation_);
+    while (stepper.fluid_steps() < schedule_.end) {
+      stepper.step();
+      const std::int64_t step = stepper.fluid_steps();
+      if (wanted(step)) stepper.sync();
       outputs(step);
       const bool stop = options_.stop_requested && options_.stop_requested();
       const bool by_clock =
           scene_.time.checkpoint_wall > 0 && omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
       if (stop || by_clock || due(step, schedule_.checkpoint)) {
+        stepper.sync();
         checkpoint();
         last_checkpoint = omp_get_wtime();
       }
@@ -115,6 +119,12 @@ class Run {
           },
           group.cells);
     surfaces_->append(simulation_.time(), position);
+  }
+
+  /// Will outputs() read the simulation?
+  bool wanted(std::int64_t step) const {
+    return due(step, schedule_.average) || due(step, schedule_.profile) || due(step, schedule_.surface) ||
+           due(step, schedule_.sample) || step >= schedule_.end;
   }
 
   void outputs(std::int64_t step) {

@@ -2,13 +2,10 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 hemowalk_library(hemowalk_resolved
   SOURCES
-    build.cpp
     checkpoint.cpp
-    packing.cpp
     preflight.cpp
     recorder.cpp
     resolve.cpp
-    simulation.cpp
     surface_output.cpp
   LINK
-    hemowalk_mesh hemowalk_lbm hemowalk_npfem hemowalk_rigid hemowalk_ibm hemowalk_contact hemowalk_data PkgConfig::ZSTD)
+    hemowalk_step hemowalk_data PkgConfig::ZSTD)

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <variant>
 #include <vector>
@@ -63,6 +64,9 @@ struct Momentum {
 };
 
 template <class Real>
+class DeviceSimulation;
+
+template <class Real>
 class Simulation {
  public:
   /// Lattice, cells and steady initial flow. \throws InputError when the scene cannot be simulated.
@@ -87,6 +91,10 @@ class Simulation {
   View<const Node4<Real>> force() const { return force_.view(); }
   /// What interpolation reads: u* + theta/2 F_prev with halo.
   View<const Node4<Real>> velocity() const { return velocity_.view(); }
+  /// Who moves the cells instead of the groups themselves: from predicted() to positions, velocities and
+  /// normals, a report per group (place.solid: device). Empty: the groups.
+  using SolidStep = std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)>;
+  void set_solid_step(SolidStep step) { solid_step_ = std::move(step); }
   const contact::Summary& contact_summary() const { return contact_summary_; }
   /// Force of the cells on the lower and the upper wall in the last step, through kernels and by contact.
   const std::array<std::array<double, 3>, 2>& force_on_walls() const { return force_on_walls_; }
@@ -104,6 +112,7 @@ class Simulation {
   void load(View<const std::byte> state);
 
  private:
+  friend class DeviceSimulation<Real>;  // takes over the state and gives it back
   void build_groups(const std::vector<InitialCell>& cells);
   void build_coupling();
   void start_flow();
@@ -142,6 +151,7 @@ class Simulation {
   };
   std::vector<PointLoad> loads_;
 
+  SolidStep solid_step_;
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;
