@@ -41,7 +41,7 @@ struct Wall {
   float uptake = 0;     ///< robin: k dt; trap: layer dt/residence
   float residence = 0;  ///< trap: residence time in steps
   float variance = 0;   ///< 2 D dt at the face
-  bool active() const { return type != Face::Type::reflect && type != Face::Type::periodic; }
+  HEMO_HD bool active() const { return type != Face::Type::reflect && type != Face::Type::periodic; }
 };
 
 /// Everything a step needs, by value and by pointers that outlive the walk.

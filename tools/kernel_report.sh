@@ -14,7 +14,7 @@ done)
 for arch in "$@"; do
   for file in $files; do
     "$nvcc" -std=c++20 -O3 --expt-relaxed-constexpr -diag-suppress=554 -DHEMOWALK_CUDA=1 -I. -Xcompiler=-fopenmp \
-      -cubin -arch="sm_$arch" -Xptxas -v -o /dev/null "$file" >> "$log" 2>&1 || { tail -20 "$log"; exit 1; }
+      -x cu -cubin -arch="sm_$arch" -Xptxas -v -o /dev/null "$file" >> "$log" 2>&1 || { tail -20 "$log"; exit 1; }
   done
 done
 [ -z "${KEEP_LOG:-}" ] || cp "$log" "$KEEP_LOG"
