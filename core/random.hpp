@@ -35,7 +35,7 @@ struct RandomBits {
 };
 
 /// Ten rounds of Philox 4x32 on \p counter, with the 64-bit key \p seed.
-HEMO_HD inline RandomBits philox4x32(RandomBits counter, std::uint64_t seed) {
+HEMO_HD inline RandomBits philox_bits(RandomBits counter, std::uint64_t seed) {
   auto k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
   std::uint32_t(&c)[4] = counter.word;
   for (int round = 0; round < 10; ++round) {
@@ -53,7 +53,7 @@ HEMO_HD inline RandomBits philox4x32(RandomBits counter, std::uint64_t seed) {
 /// The bits that belong to (seed, stream, id, step). id: 64 bits; step: 56 bits (higher bits are ignored).
 HEMO_HD inline RandomBits random_bits(std::uint64_t seed, Stream stream, std::uint64_t id,
                                       std::uint64_t step) {
-  return philox4x32(
+  return philox_bits(
       {{static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(id >> 32),
         static_cast<std::uint32_t>(step),
         (static_cast<std::uint32_t>(step >> 32) & 0xffffffu) | (static_cast<std::uint32_t>(stream) << 24)}},

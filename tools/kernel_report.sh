@@ -13,7 +13,7 @@ files=$(find core resolved coarse tools -name CMakeLists.txt | sort | while read
 done)
 for arch in "$@"; do
   for file in $files; do
-    "$nvcc" -std=c++20 -O3 --expt-relaxed-constexpr -diag-suppress=554 -DHEMOWALK_CUDA=1 -I. -Xcompiler=-fopenmp \
+    "$nvcc" -std=c++20 -O3 --expt-relaxed-constexpr -diag-suppress=554,1675 -Werror=cross-execution-space-call -DHEMOWALK_CUDA=1 -I. -Xcompiler=-fopenmp \
       -x cu -cubin -arch="sm_$arch" -Xptxas -v -o /dev/null "$file" >> "$log" 2>&1 || { tail -20 "$log"; exit 1; }
   done
 done

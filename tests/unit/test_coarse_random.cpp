@@ -28,11 +28,11 @@ TEST(RandomBits, AreRandom123s) {
     const r123::Philox4x32::key_type key = {
         {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
     const auto expected = r123::Philox4x32()(counter, key);
-    mine = philox4x32(mine, seed);
+    mine = philox_bits(mine, seed);
     for (int w = 0; w < 4; ++w) ASSERT_EQ(mine.word[w], expected[w]);
   }
   // known answers of the library's own tests: the step's upper byte belongs to the stream
-  const RandomBits zero = philox4x32({{0, 0, 0, 0}}, 0);
+  const RandomBits zero = philox_bits({{0, 0, 0, 0}}, 0);
   EXPECT_EQ(zero.word[0], 0x6627e8d5u);
   EXPECT_EQ(zero.word[3], 0x9b00dbd8u);
   EXPECT_NE(random_bits(1, Stream::test, 2, 3).word[0], random_bits(1, Stream::initial, 2, 3).word[0]);
