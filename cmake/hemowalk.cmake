@@ -42,7 +42,7 @@ target_link_libraries(hemowalk_flags INTERFACE OpenMP::OpenMP_CXX)
 if(HEMOWALK_CUDA)
   target_compile_definitions(hemowalk_flags INTERFACE HEMOWALK_CUDA=1)
   target_compile_options(hemowalk_flags INTERFACE
-    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -diag-suppress=554 -Xcompiler=-fopenmp -Xcompiler=-Wall>)
+    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -diag-suppress=554,1675 -Werror=cross-execution-space-call -Xcompiler=-fopenmp -Xcompiler=-Wall>)
   target_link_libraries(hemowalk_flags INTERFACE CUDA::cudart)
 endif()
 

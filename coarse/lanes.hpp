@@ -1,12 +1,7 @@
 #pragma once
-/// \file Lanes<W>: the number types of W walkers that move together, and the few operations the physics needs
-/// beyond arithmetic. Lanes<1> is plain scalars: the reference, and what a device thread would run.
+/// \file Lanes<W> as packs of W walkers. Host only.
 
-#include <cmath>
-#include <cstdint>
-#include <type_traits>
-
-#include "core/portability.hpp"
+#include "coarse/scalar_lanes.hpp"
 #include "core/simd.hpp"
 
 namespace hemowalk::coarse {
@@ -20,40 +15,7 @@ struct Lanes {
   using Wide = Pack<std::uint64_t, W / 2>;  ///< half of the lanes, for 32 x 32 -> 64 bit products
   using Flag = typename Int::mask_type;
 };
-template <>
-struct Lanes<1> {
-  static constexpr int width = 1;
-  using Real = float;
-  using Int = std::int32_t;
-  using Bits = std::uint32_t;
-  using Flag = bool;
-};
 
-/// The same bits as another type of equal size.
-template <class To, class From>
-HEMO_INLINE To same_bits(const From& from) {
-  return __builtin_bit_cast(To, from);
-}
-
-// --- scalar ---
-HEMO_INLINE float select(bool flag, float a, float b) { return flag ? a : b; }
-HEMO_INLINE std::int32_t select(bool flag, std::int32_t a, std::int32_t b) { return flag ? a : b; }
-HEMO_INLINE bool any(bool flag) { return flag; }
-/// A comparison of Reals as a Flag (the mask type of Int).
-HEMO_INLINE bool flag_of(bool comparison) { return comparison; }
-HEMO_INLINE float to_real(std::int32_t x) { return static_cast<float>(x); }
-HEMO_INLINE float to_real(std::uint32_t x) { return static_cast<float>(x); }
-/// Truncates; |x| < 2^31.
-HEMO_INLINE std::int32_t to_int(float x) { return static_cast<std::int32_t>(x); }
-HEMO_INLINE std::int32_t as_signed(std::uint32_t x) { return static_cast<std::int32_t>(x); }
-HEMO_INLINE std::uint32_t as_bits(std::int32_t x) { return static_cast<std::uint32_t>(x); }
-/// table[i] and table[i + 1].
-HEMO_INLINE void gather_pair(const float* table, std::int32_t i, float& first, float& second) {
-  first = table[i];
-  second = table[i + 1];
-}
-
-// --- packs ---
 template <class T, class A>
 HEMO_INLINE stdx::simd<T, A> select(const stdx::simd_mask<T, A>& flag, const stdx::simd<T, A>& a,
                                     const stdx::simd<T, A>& b) {

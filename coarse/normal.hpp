@@ -3,14 +3,14 @@
 /// by iteratively reweighted least squares), and the Box-Muller pair built from them. Largest relative errors
 /// in float arithmetic, tested: log 2e-7, sine and cosine 2e-7 of the larger, exp 3e-7, erfcx 4e-7.
 
-#include "coarse/lanes.hpp"
 #include "coarse/philox.hpp"
+#include "coarse/scalar_lanes.hpp"
 
 namespace hemowalk::coarse {
 
 /// sum c[k] x^k.
 template <class Real, std::size_t N>
-HEMO_INLINE Real polynomial(const float (&c)[N], const Real& x) {
+HEMO_HD HEMO_INLINE Real polynomial(const float (&c)[N], const Real& x) {
   Real sum = c[N - 1];
 #pragma GCC unroll 16
   for (int k = static_cast<int>(N) - 2; k >= 0; --k) sum = sum * x + c[k];
@@ -19,7 +19,7 @@ HEMO_INLINE Real polynomial(const float (&c)[N], const Real& x) {
 
 /// -2 ln(x / 2^32) for 1 <= x <= 2^32: exact exponent, so small results keep their relative accuracy.
 template <class L>
-HEMO_INLINE typename L::Real minus_two_log(const typename L::Real& x) {
+HEMO_HD HEMO_INLINE typename L::Real minus_two_log(const typename L::Real& x) {
   using Real = typename L::Real;
   using Int = typename L::Int;
   // mantissa in [sqrt(1/2), sqrt(2)), exponent to match
@@ -35,7 +35,8 @@ HEMO_INLINE typename L::Real minus_two_log(const typename L::Real& x) {
 
 /// cos and sin of 2 pi w / 2^32.
 template <class L>
-HEMO_INLINE void unit_circle(const typename L::Bits& w, typename L::Real& cosine, typename L::Real& sine) {
+HEMO_HD HEMO_INLINE void unit_circle(const typename L::Bits& w, typename L::Real& cosine,
+                                     typename L::Real& sine) {
   using Real = typename L::Real;
   using Int = typename L::Int;
   using Bits = typename L::Bits;
@@ -59,7 +60,7 @@ struct NormalPair {
   typename L::Real square, cosine, sine;
 
   NormalPair() = default;
-  HEMO_INLINE NormalPair(const typename L::Bits& w0, const typename L::Bits& w1) {
+  HEMO_HD HEMO_INLINE NormalPair(const typename L::Bits& w0, const typename L::Bits& w1) {
     square = minus_two_log<L>(to_real(w0) + typename L::Real(0.5f));
     unit_circle<L>(w1, cosine, sine);
   }
@@ -67,14 +68,14 @@ struct NormalPair {
 
 /// Uniform in (0, 1] from 32 bits (rounded to single precision).
 template <class L>
-HEMO_INLINE typename L::Real uniform(const typename L::Bits& w) {
+HEMO_HD HEMO_INLINE typename L::Real uniform(const typename L::Bits& w) {
   using Real = typename L::Real;
   return (to_real(w) + Real(0.5f)) * Real(2.3283064365386963e-10f);
 }
 
 /// e^x; x is clamped to [-87, 88].
 template <class L>
-HEMO_INLINE typename L::Real exponential(const typename L::Real& x) {
+HEMO_HD HEMO_INLINE typename L::Real exponential(const typename L::Real& x) {
   using std::max;
   using std::min;
   using Real = typename L::Real;
@@ -88,7 +89,7 @@ HEMO_INLINE typename L::Real exponential(const typename L::Real& x) {
 
 /// e^(x^2) erfc(x), x >= 0.
 template <class L>
-HEMO_INLINE typename L::Real erfcx(const typename L::Real& x) {
+HEMO_HD HEMO_INLINE typename L::Real erfcx(const typename L::Real& x) {
   using Real = typename L::Real;
   const Real t = Real(1) / (Real(1) + Real(0.4f) * x);
   static constexpr float c[] = {0.421612691f,  0.643722196f,  0.726271571f,  0.547961323f, 0.181186042f,

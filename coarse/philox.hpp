@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-#include "coarse/lanes.hpp"
+#include "coarse/scalar_lanes.hpp"
 #include "core/random.hpp"
 
 namespace hemowalk::coarse {
@@ -24,7 +24,7 @@ inline constexpr std::uint32_t philox_weyl[2] = {0x9E3779B9u, 0xBB67AE85u};
 
 /// Ten rounds on H independent halves; the rounds of different halves overlap in the pipeline.
 template <int H, class Wide>
-HEMO_INLINE void philox_rounds(Wide (&c)[4][H], std::uint64_t seed) {
+HEMO_HD HEMO_INLINE void philox_rounds(Wide (&c)[4][H], std::uint64_t seed) {
   const Wide low = 0xffffffffu;
   auto k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
 #pragma GCC unroll 10
@@ -47,8 +47,8 @@ HEMO_INLINE void philox_rounds(Wide (&c)[4][H], std::uint64_t seed) {
 
 /// The 128 bits of (seed, stream, first_id + offset, step) for every lane. \p offset < 2^32 - first_id.
 template <class L>
-HEMO_INLINE Words<L> lane_bits(std::uint64_t seed, Stream stream, std::uint64_t first_id,
-                               const typename L::Bits& offset, std::uint64_t step) {
+HEMO_HD HEMO_INLINE Words<L> lane_bits(std::uint64_t seed, Stream stream, std::uint64_t first_id,
+                                       const typename L::Bits& offset, std::uint64_t step) {
   if constexpr (L::width == 1) {
     const RandomBits b = random_bits(seed, stream, first_id + offset, step);
     return {{b.word[0], b.word[1], b.word[2], b.word[3]}};

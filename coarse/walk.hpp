@@ -9,9 +9,9 @@
 #include <cstdint>
 
 #include "coarse/case.hpp"
-#include "coarse/lanes.hpp"
 #include "coarse/normal.hpp"
 #include "coarse/philox.hpp"
+#include "coarse/scalar_lanes.hpp"
 
 namespace hemowalk::coarse {
 
@@ -41,7 +41,7 @@ struct Wall {
   float uptake = 0;     ///< robin: k dt; trap: layer dt/residence
   float residence = 0;  ///< trap: residence time in steps
   float variance = 0;   ///< 2 D dt at the face
-  bool active() const { return type != Face::Type::reflect && type != Face::Type::periodic; }
+  HEMO_HD bool active() const { return type != Face::Type::reflect && type != Face::Type::periodic; }
 };
 
 /// Everything a step needs, by value and by pointers that outlive the walk.
@@ -79,7 +79,7 @@ template <class L, bool Table, bool Drift>
 struct LocalLaw {
   typename L::Real variance, drift;
 
-  HEMO_INLINE LocalLaw(const WalkModel& m, const typename L::Int& y) {
+  HEMO_HD HEMO_INLINE LocalLaw(const WalkModel& m, const typename L::Int& y) {
     using Real = typename L::Real;
     if constexpr (!Table) {
       variance = Real(m.variance[0]);
@@ -107,8 +107,9 @@ struct LocalLaw {
 /// Q = sqrt(4 pi) e erfcx((x0 + x1)/sqrt(2 s) + e) / (1 + exp(2 x0 x1/s)), e = k sqrt(dt/D) =
 /// uptake/sqrt(s/2).
 template <class L>
-HEMO_INLINE typename L::Real uptake_probability(const typename L::Real& x0, const typename L::Real& x1,
-                                                const typename L::Real& s, const typename L::Real& uptake) {
+HEMO_HD HEMO_INLINE typename L::Real uptake_probability(const typename L::Real& x0,
+                                                        const typename L::Real& x1, const typename L::Real& s,
+                                                        const typename L::Real& uptake) {
   using std::sqrt;
   using Real = typename L::Real;
   const Real e = uptake / sqrt(s * Real(0.5f));
@@ -118,8 +119,8 @@ HEMO_INLINE typename L::Real uptake_probability(const typename L::Real& x0, cons
 
 /// What a walker taken up in \p step is stored as: absorbed, or trapped until an exponential time has passed.
 template <class L>
-HEMO_INLINE typename L::Int taken_code(const Wall& wall, int side, std::int64_t step,
-                                       const typename L::Bits& word) {
+HEMO_HD HEMO_INLINE typename L::Int taken_code(const Wall& wall, int side, std::int64_t step,
+                                               const typename L::Bits& word) {
   using std::min;
   using Real = typename L::Real;
   using Int = typename L::Int;
@@ -135,9 +136,10 @@ HEMO_INLINE typename L::Int taken_code(const Wall& wall, int side, std::int64_t 
 /// (0 bottom, 1 top). Called only when a lane is near, so it stays out of line, and takes everything by value
 /// so that the lanes stay in registers where it is not called.
 template <class L>
-[[gnu::noinline]] typename L::Int meet_wall(const WalkModel& m, int side, typename L::Int code,
-                                            typename L::Bits offset, typename L::Real x0, typename L::Real x1,
-                                            typename L::Real s, std::uint64_t first_id, std::int64_t step) {
+[[gnu::noinline]] HEMO_HD typename L::Int meet_wall(const WalkModel& m, int side, typename L::Int code,
+                                                    typename L::Bits offset, typename L::Real x0,
+                                                    typename L::Real x1, typename L::Real s,
+                                                    std::uint64_t first_id, std::int64_t step) {
   using std::abs;
   using std::sqrt;
   using Real = typename L::Real;
@@ -170,8 +172,8 @@ struct Release {
 /// Place and code of walkers whose residence ends within \p step: they diffuse for the rest of it from the
 /// face, and may be taken up again at once.
 template <class L>
-[[gnu::noinline]] Release<L> leave_trap(const WalkModel& m, int side, typename L::Bits offset,
-                                        std::uint64_t first_id, std::int64_t step) {
+[[gnu::noinline]] HEMO_HD Release<L> leave_trap(const WalkModel& m, int side, typename L::Bits offset,
+                                                std::uint64_t first_id, std::int64_t step) {
   using std::abs;
   using std::max;
   using std::sqrt;
@@ -198,9 +200,9 @@ template <class L>
 
 /// Moves the walkers by \p scatter + \p drift and lets the faces act.
 template <class L, StepLaw S>
-HEMO_INLINE void move(const WalkModel& m, LaneState<L>& w, const typename L::Real& scatter,
-                      const typename L::Real& drift, const typename L::Real& s, std::uint64_t first_id,
-                      std::int64_t step) {
+HEMO_HD HEMO_INLINE void move(const WalkModel& m, LaneState<L>& w, const typename L::Real& scatter,
+                              const typename L::Real& drift, const typename L::Real& s,
+                              std::uint64_t first_id, std::int64_t step) {
   using std::abs;
   using Real = typename L::Real;
   using Int = typename L::Int;
@@ -239,9 +241,9 @@ constexpr int steps_per_block(StepLaw law) { return law == StepLaw::gaussian ? 4
 
 /// The random part of the displacement in step \p k of a block.
 template <class L, StepLaw S>
-HEMO_INLINE typename L::Real scatter_of(const WalkModel& m, int k, const NormalPair<L>& pair,
-                                        const Words<L>& words, const typename L::Real& variance,
-                                        LaneState<L>& w) {
+HEMO_HD HEMO_INLINE typename L::Real scatter_of(const WalkModel& m, int k, const NormalPair<L>& pair,
+                                                const Words<L>& words, const typename L::Real& variance,
+                                                LaneState<L>& w) {
   using std::sqrt;
   using Real = typename L::Real;
   const Real& turn = k % 2 == 0 ? pair.cosine : pair.sine;
@@ -272,8 +274,8 @@ HEMO_INLINE typename L::Real scatter_of(const WalkModel& m, int k, const NormalP
 /// chain of dependent instructions (position, cell, D, square root, position); several sets side by side fill
 /// its gaps. \p visit(set, before) is called every step.
 template <class L, StepLaw S, bool Table, bool Drift, int N, class Visit>
-HEMO_INLINE void walk_steps(const WalkModel& m, LaneState<L> (&w)[N], std::uint64_t first_id,
-                            std::int64_t begin, std::int64_t end, const Visit& visit) {
+HEMO_HD HEMO_INLINE void walk_steps(const WalkModel& m, LaneState<L> (&w)[N], std::uint64_t first_id,
+                                    std::int64_t begin, std::int64_t end, const Visit& visit) {
   constexpr int n = steps_per_block(S);
   for (std::int64_t block = begin / n; block * n < end; ++block) {
     Words<L> words[N];

@@ -5,22 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "coarse/slab_law.hpp"
-#include "coarse/walk.hpp"
+#include "coarse/lanes.hpp"
+#include "coarse/walk_model.hpp"
 #include "core/array.hpp"
 
 namespace hemowalk::coarse {
-
-/// How the walk is carried out; the physics is in Case and SlabLaw.
-struct WalkSettings {
-  WallScheme scheme = WallScheme::exact;
-  StepLaw step_law = StepLaw::gaussian;
-  double memory = 0;                            ///< s, persistent
-  double tail_exponent = 0, tail_fraction = 0;  ///< heavy_tail: P(|step| > x) ~ x^-exponent, exponent > 2
-  double cell_free_layer = 0;                   ///< m, for traps that state no layer
-  bool track_flow_direction = false;            ///< z = sum of u(y) dt
-  bool ito_drift = true;  ///< false drops D': wrong on purpose, for the test of the test
-};
 
 /// N walkers in a slab, independent of each other; each one is a function of (seed, id) alone. They advance
 /// in blocks of 1024: a block walks all steps of a leg in cache and registers, absorbed walkers are taken out

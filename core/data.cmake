@@ -19,15 +19,16 @@ add_custom_target(hemowalk_commit
           -P ${CMAKE_SOURCE_DIR}/core/commit.cmake
   BYPRODUCTS ${commit_header})
 
+hemowalk_library(hemowalk_mpi SOURCES mpi.cpp LINK hemowalk_core MPI::MPI_CXX)
 hemowalk_library(hemowalk_data
   SOURCES
-    io.cpp log.cpp mpi.cpp progress.cpp provenance.cpp statistics.cpp units.cpp
+    io.cpp log.cpp progress.cpp provenance.cpp statistics.cpp units.cpp
     data/scene.cpp data/scene_checks.cpp data/scene_format.cpp data/scene_write.cpp data/trajectories.cpp data/transport_law.cpp
     hdf5.cpp
     yaml/canonical.cpp yaml/describe.cpp yaml/document.cpp yaml/overrides.cpp yaml/scalars.cpp yaml/schema.cpp yaml/text.cpp
     yaml/validate.cpp
   LINK
-    hemowalk_core MPI::MPI_CXX GSL::gsl GSL::gslcblas yaml-cpp nlohmann_json::nlohmann_json spdlog::spdlog fmt::fmt
+    hemowalk_mpi GSL::gsl GSL::gslcblas yaml-cpp nlohmann_json::nlohmann_json spdlog::spdlog fmt::fmt
     PkgConfig::hemowalk_hdf5 OpenSSL::Crypto ${UDUNITS2_LIBRARY})
 # GCC 12 sees an overlap in `"text" + std::string` that is not there (GCC bug 105651).
 target_compile_options(hemowalk_data PRIVATE -Wno-restrict)

@@ -1,12 +1,11 @@
 #pragma once
-/// \file Counter-based random numbers: Philox 4x32-10 (Salmon et al., SC 2011) through Random123.
+/// \file Counter-based random numbers: Philox 4x32-10 (Salmon et al., SC 2011), bit for bit the
+/// numbers of the Random123 library, on host and device.
 ///
 /// A number is a pure function of (seed, stream, id, step): no state, no order, so results do not depend on
 /// ranks, threads, save intervals or restarts. Use: `normal2(random_bits(seed, Stream::coarse_walk, walker,
 /// step))`. One block of bits feeds 4 floats or 2 doubles; who needs more per (id, step) counts blocks in
 /// `step`.
-
-#include <Random123/philox.h>
 
 #include <cmath>
 #include <cstddef>
@@ -35,16 +34,30 @@ struct RandomBits {
   std::uint32_t word[4];
 };
 
+/// Ten rounds of Philox 4x32 on \p counter, with the 64-bit key \p seed.
+HEMO_HD inline RandomBits philox_bits(RandomBits counter, std::uint64_t seed) {
+  auto k0 = static_cast<std::uint32_t>(seed), k1 = static_cast<std::uint32_t>(seed >> 32);
+  std::uint32_t(&c)[4] = counter.word;
+  for (int round = 0; round < 10; ++round) {
+    const std::uint64_t p0 = std::uint64_t{0xD2511F53u} * c[0], p1 = std::uint64_t{0xCD9E8D57u} * c[2];
+    c[0] = static_cast<std::uint32_t>(p1 >> 32) ^ c[1] ^ k0;
+    c[2] = static_cast<std::uint32_t>(p0 >> 32) ^ c[3] ^ k1;
+    c[1] = static_cast<std::uint32_t>(p1);
+    c[3] = static_cast<std::uint32_t>(p0);
+    k0 += 0x9E3779B9u;
+    k1 += 0xBB67AE85u;
+  }
+  return counter;
+}
+
 /// The bits that belong to (seed, stream, id, step). id: 64 bits; step: 56 bits (higher bits are ignored).
 HEMO_HD inline RandomBits random_bits(std::uint64_t seed, Stream stream, std::uint64_t id,
                                       std::uint64_t step) {
-  const r123::Philox4x32::ctr_type counter = {
-      {static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(id >> 32), static_cast<std::uint32_t>(step),
-       (static_cast<std::uint32_t>(step >> 32) & 0xffffffu) | (static_cast<std::uint32_t>(stream) << 24)}};
-  const r123::Philox4x32::key_type key = {
-      {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
-  const r123::Philox4x32::ctr_type out = r123::Philox4x32()(counter, key);
-  return {{out[0], out[1], out[2], out[3]}};
+  return philox_bits(
+      {{static_cast<std::uint32_t>(id), static_cast<std::uint32_t>(id >> 32),
+        static_cast<std::uint32_t>(step),
+        (static_cast<std::uint32_t>(step >> 32) & 0xffffffu) | (static_cast<std::uint32_t>(stream) << 24)}},
+      seed);
 }
 
 /// Uniform in the open interval (0, 1) from 23 bits: both ends excluded, so log(u) and log(1 - u) are finite.

@@ -1,7 +1,5 @@
 #include "resolved/copies.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "core/check.hpp"
+#include "core/text.hpp"
 #include "resolved/bytes.hpp"
 
 namespace hemowalk::resolved {
@@ -293,8 +292,8 @@ void Copies<Real>::check_reach() const {
   const double low = sides_[0].reach, high = sides_[1].reach, most = std::max(low, high);
   const bool meet = range_ >= 0 && low + high + range_ > block_.nz;
   require(!meet && most <= block_.nz - 1, [&] {
-    return fmt::format(
-        "cells reach {:.1f} and {:.1f} planes into a slab of {} (they would touch beyond it, unseen by their "
+    return formatted(
+        "cells reach %.1f and %.1f planes into a slab of %d (they would touch beyond it, unseen by their "
         "own ranks) use fewer ranks",
         low, high, block_.nz);
   });

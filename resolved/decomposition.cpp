@@ -1,12 +1,11 @@
 #include "resolved/decomposition.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/check.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::resolved {
 
@@ -16,9 +15,9 @@ Decomposition::Decomposition(const Block& whole, mpi::Ranks ranks, double thicke
   const int thinnest = whole.nz / ranks_.count();
   const int needed = std::max(Block::halo, static_cast<int>(std::ceil(thickest)));
   require(thinnest >= needed, [&] {
-    return fmt::format(
-        "{} ranks leave slabs of {} planes (a cell reaches no farther than one neighbour: {} are needed) use "
-        "{} or fewer ranks, or a box that is longer along z",
+    return formatted(
+        "%d ranks leave slabs of %d planes (a cell reaches no farther than one neighbour: %d are needed) use "
+        "%d or fewer ranks, or a box that is longer along z",
         ranks_.count(), thinnest, needed, std::max(1, whole.nz / needed));
   });
   block_.nz = first_of(ranks_.rank() + 1) - first_plane();

@@ -1,6 +1,5 @@
 #include "resolved/packing.hpp"
 
-#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 
 #include "core/check.hpp"
 #include "core/random.hpp"
+#include "core/text.hpp"
 #include "resolved/build.hpp"
 #include "resolved/contact/grid.hpp"
 #include "resolved/region.hpp"
@@ -256,8 +256,8 @@ void Packing::scatter() {
       needed += b.cells * (mesh::volume(rest) + mesh::area(rest) * smallest_packed_gap / 2);
     }
   require(needed < room, [&] {
-    return fmt::format(
-        "cells.hematocrit {:g} cannot be packed (cells with gaps of {:g} dx fill {:.0f} % of the box) lower "
+    return formatted(
+        "cells.hematocrit %g cannot be packed (cells with gaps of %g dx fill %.0f %% of the box) lower "
         "it",
         scene_.cells.hematocrit.value_or(0), smallest_packed_gap, 100 * needed / room);
   });
@@ -324,11 +324,11 @@ void Packing::scatter() {
             groups_[b.kind].cells);
       }
       require(placed, [&] {
-        return fmt::format(
-            "cells.hematocrit: no room for cell {} even at {:.0f} % of its size (the box is too small for "
+        return formatted(
+            "cells.hematocrit: no room for cell %s even at %.0f %% of its size (the box is too small for "
             "such "
             "bodies) enlarge the box or lower the hematocrit",
-            id, 100 * scale_);
+            std::to_string(id).c_str(), 100 * scale_);
       });
     }
 }
@@ -377,9 +377,9 @@ void Packing::step() {
           options.damping = false;
           const mesh::StepReport report = g.step(options);
           if (report.bad_cell >= 0)
-            throw PhysicsError(fmt::format(
-                "packing: cell {} of kind {} blew up (its position is not finite) try another seed",
-                report.bad_cell, scene_.cells.kinds[group.kind].name));
+            throw PhysicsError(
+                formatted("packing: cell %d of kind %s blew up (its position is not finite) try another seed",
+                          report.bad_cell, scene_.cells.kinds[group.kind].name.c_str()));
         },
         group.cells);
   }
@@ -401,10 +401,11 @@ contact::Overlap Packing::measure(double within) const {
 
 void Packing::give_up(double scale, const contact::Overlap& overlap) const {
   throw InputError(
-      fmt::format("cells.hematocrit {:g} cannot be packed (with cells at {:.1f} % of their size the smallest "
-                  "gap is {:.3f} dx and {} "
-                  "vertices are inside other cells) lower it",
-                  scene_.cells.hematocrit.value_or(0), 100 * scale, overlap.minimum_gap, overlap.inside));
+      formatted("cells.hematocrit %g cannot be packed (with cells at %.1f %% of their size the smallest "
+                "gap is %.3f dx and %s "
+                "vertices are inside other cells) lower it",
+                scene_.cells.hematocrit.value_or(0), 100 * scale, overlap.minimum_gap,
+                std::to_string(overlap.inside).c_str()));
 }
 
 /// Cells with their centres in the box.
@@ -496,16 +497,16 @@ std::vector<InitialCell> Packing::place() {
     return std::string("?");
   };
   require(overlap.inside == 0 && overlap.minimum_gap > 0, [&] {
-    return fmt::format(
-        "cells.explicit.{} and cells.explicit.{} overlap (by {:.3g} um; {} vertices are inside another cell) "
+    return formatted(
+        "cells.explicit.%s and cells.explicit.%s overlap (by %.3g um; %s vertices are inside another cell) "
         "move them apart",
-        name(overlap.first), name(overlap.second), 1e6 * units_.to_length(-overlap.minimum_gap),
-        overlap.inside);
+        name(overlap.first).c_str(), name(overlap.second).c_str(),
+        1e6 * units_.to_length(-overlap.minimum_gap), std::to_string(overlap.inside).c_str());
   });
   require(overlap.outside_walls == 0, [&] {
-    return fmt::format(
-        "cells.explicit: {} vertices are beyond a wall (by {:.3g} um) move the cells away from it",
-        overlap.outside_walls, 1e6 * units_.to_length(-overlap.minimum_wall_gap));
+    return formatted("cells.explicit: %s vertices are beyond a wall (by %.3g um) move the cells away from it",
+                     std::to_string(overlap.outside_walls).c_str(),
+                     1e6 * units_.to_length(-overlap.minimum_wall_gap));
   });
   return cells;
 }

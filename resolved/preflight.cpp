@@ -7,6 +7,7 @@
 #include "core/check.hpp"
 #include "resolved/build.hpp"
 #include "resolved/resolve.hpp"
+#include "resolved/stepper.hpp"
 
 namespace hemowalk::resolved {
 
@@ -47,11 +48,7 @@ void check_available(const Scene& scene, std::vector<std::string>& problems) {
     problems.push_back(
         "contact.model particle_in_kernel belongs to coupling.scheme paper (not available in this version) "
         "use pairwise");
-  if (scene.place.fluid != Place::host || scene.place.coupling != Place::host ||
-      scene.place.solid != Place::host)
-    problems.push_back(
-        "place: device is not available in this version (the kernels compile, no driver runs them yet) use "
-        "host");
+  if (const std::string problem = place_problem(scene); !problem.empty()) problems.push_back(problem);
 }
 
 void check_flow(const Scene& scene, const LatticeUnits& units, std::vector<std::string>& problems) {

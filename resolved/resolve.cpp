@@ -22,6 +22,7 @@
 #include "resolved/recorder.hpp"
 #include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
+#include "resolved/stepper.hpp"
 #include "resolved/surface_output.hpp"
 
 namespace hemowalk::resolved {
@@ -75,9 +76,11 @@ class Run {
     }
     double last_checkpoint = omp_get_wtime();
     mpi::Agreement agreement(options_.ranks);
-    while (simulation_.fluid_steps() < schedule_.end) {
-      simulation_.step();
-      const std::int64_t step = simulation_.fluid_steps();
+    Stepper<Real> stepper(simulation_);
+    while (stepper.fluid_steps() < schedule_.end) {
+      stepper.step();
+      const std::int64_t step = stepper.fluid_steps();
+      if (wanted(step)) stepper.sync();
       outputs(step);
       const bool by_clock = root() && scene_.time.checkpoint_wall > 0 &&
                             omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
@@ -85,6 +88,7 @@ class Run {
       const unsigned agreed = agreement.any((asked ? stop_flag : 0) | (by_clock ? checkpoint_flag : 0));
       const bool stop = agreed & stop_flag;
       if (agreed || due(step, schedule_.checkpoint)) {
+        stepper.sync();
         checkpoint();
         last_checkpoint = omp_get_wtime();
       }
@@ -132,6 +136,12 @@ class Run {
       position.insert(position.end(), all.values.begin(), all.values.end());
     }
     if (root()) surfaces_->append(simulation_.time(), position);
+  }
+
+  /// Will outputs() read the simulation?
+  bool wanted(std::int64_t step) const {
+    return due(step, schedule_.average) || due(step, schedule_.profile) || due(step, schedule_.surface) ||
+           due(step, schedule_.sample) || step >= schedule_.end;
   }
 
   void outputs(std::int64_t step) {

@@ -11,6 +11,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/coupling.hpp"
 #include "resolved/mesh/vector.hpp"
 #include "resolved/region.hpp"
 #include "resolved/retraction.hpp"
@@ -272,13 +273,14 @@ void Simulation<Real>::predict() {
                 const std::size_t at = 3 * static_cast<std::size_t>(group.first_marker) + vector + l;
                 for (int d = 0; d < 3; ++d) w[d] += g[d] + normal_rate_[at + d * lanes];
                 u = {w[0], w[1], w[2], Real(0)};
-                const Real force[3] = {F.x + couple_force_[at], F.y + couple_force_[at + lanes],
-                                       F.z + couple_force_[at + 2 * lanes]};
-                for (int d = 0; d < 3; ++d) {
-                  // As an increment over w: rounding then touches a small number and momentum does not drift.
-                  const Real v = velocities[vector + d * lanes + l];
-                  predicted[vector + d * lanes + l] = w[d] + (m * (v - w[d]) + h * force[d]) * inverse_metric;
-                }
+                const Vector<Real> force{F.x + couple_force_[at], F.y + couple_force_[at + lanes],
+                                         F.z + couple_force_[at + 2 * lanes]};
+                const Vector<Real> v{velocities[vector + l], velocities[vector + lanes + l],
+                                     velocities[vector + 2 * lanes + l]};
+                const Vector<Real> next =
+                    predicted_velocity(Vector<Real>{w[0], w[1], w[2]}, v, force, m, h, inverse_metric);
+                predicted[vector + l] = next.x, predicted[vector + lanes + l] = next.y,
+                                   predicted[vector + 2 * lanes + l] = next.z;
               }
             }
         },
@@ -290,8 +292,10 @@ void Simulation<Real>::move_cells() {
   mesh::StepOptions options;
   options.iterations = scene_.coupling.iterations;
   solid_report_ = {};
+  const auto reports = solid_step_ ? solid_step_(options) : std::vector<mesh::StepReport>{};
   for (auto& group : groups_) {
-    const auto report = std::visit([&](auto& g) { return g.step(options); }, group.cells);
+    const auto report = solid_step_ ? reports[static_cast<std::size_t>(&group - groups_.data())]
+                                    : std::visit([&](auto& g) { return g.step(options); }, group.cells);
     if (report.bad_cell >= 0) {
       const auto id = std::visit([&](const auto& g) { return g.id(report.bad_cell); }, group.cells);
       throw PhysicsError("cell " + std::to_string(id) + " (" + scene_.cells.kinds[group.kind].name +
@@ -322,9 +326,9 @@ void Simulation<Real>::impulses() {
               for (int l = 0; l < lanes; ++l) {
                 const Node4<Real> w = reading_[slot + l];
                 const Node4<Real> none{0, 0, 0, 0};  // idle lanes give nothing
-                impulse_[slot + l] = l < used ? Node4<Real>{a * (v[l] - w.x), a * (v[lanes + l] - w.y),
-                                                            a * (v[2 * lanes + l] - w.z), 0}
-                                              : none;
+                const Vector<Real> J = marker_impulse(a, Vector<Real>{v[l], v[lanes + l], v[2 * lanes + l]},
+                                                      Vector<Real>{w.x, w.y, w.z});
+                impulse_[slot + l] = l < used ? Node4<Real>{J.x, J.y, J.z, 0} : none;
               }
             }
         },

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <variant>
 #include <vector>
@@ -80,6 +81,9 @@ struct Momentum {
 };
 
 template <class Real>
+class DeviceSimulation;
+
+template <class Real>
 class Simulation {
  public:
   /// Lattice, cells and steady initial flow. \p cells: all of them, on every rank; their place in the list is
@@ -110,6 +114,10 @@ class Simulation {
   View<const Node4<Real>> force() const { return force_.view(); }
   /// What interpolation reads: u* + theta/2 F_prev with halo.
   View<const Node4<Real>> velocity() const { return velocity_.view(); }
+  /// Who moves the cells instead of the groups themselves: from predicted() to positions, velocities and
+  /// normals, a report per group (place.solid: device). Empty: the groups.
+  using SolidStep = std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)>;
+  void set_solid_step(SolidStep step) { solid_step_ = std::move(step); }
   /// Of this rank's cells.
   const contact::Summary& contact_summary() const { return contact_summary_; }
   /// Force of the cells on this rank's part of the lower and the upper wall in the last step, through kernels
@@ -138,6 +146,7 @@ class Simulation {
   void load(View<const std::byte> state);
 
  private:
+  friend class DeviceSimulation<Real>;  // takes over the state and gives it back
   void build_groups(const std::vector<InitialCell>& cells);
   void find_loads(const std::vector<InitialCell>& cells);
   void build_coupling();
@@ -197,6 +206,7 @@ class Simulation {
   Ring handing_over_;
   std::int64_t arrivals_ = 0;
 
+  SolidStep solid_step_;
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;

@@ -6,3 +6,8 @@ hemowalk_test(test_device_membranes SOURCES unit/test_device_membranes.cpp LINK 
 hemowalk_test(test_device_bodies SOURCES unit/test_device_bodies.cpp LINK hemowalk_rigid LABELS unit)
 hemowalk_test(test_device_contact SOURCES unit/test_device_contact.cpp LINK hemowalk_contact hemowalk_ibm hemowalk_mesh
               LABELS unit)
+hemowalk_test(test_device_simulation SOURCES verification/test_device_simulation.cpp LINK hemowalk_step
+              LABELS verification)
+if(TARGET hemowalk_coarse)
+  hemowalk_test(test_device_walkers SOURCES unit/test_device_walkers.cpp LINK hemowalk_coarse LABELS unit)
+endif()

@@ -14,12 +14,14 @@ struct CellFields {
   int vertices, pitch;  ///< per cell; pitch >= vertices
   double* anchor;       ///< [cell][3], absolute
   Real *offset, *velocity, *normal, *predicted;
+  Real* held = nullptr;  ///< rigid bodies: the points that touch the fluid, like offset
 
   /// The same fields from cell \p first on.
   CellFields from(std::size_t first) const {
     CellFields f = *this;
     const std::size_t skip = at(first, 0, 0);
     f.anchor += 3 * first, f.offset += skip, f.velocity += skip, f.normal += skip, f.predicted += skip;
+    if (held) f.held += skip;
     return f;
   }
   static constexpr int padded(int vertices) { return (vertices + 31) / 32 * 32; }

@@ -13,6 +13,8 @@ struct HostFields {
   double* anchor;                    ///< [batch][3][lane]
   Real *offset, *velocity, *normal;  ///< [batch][vertex][3][lane]
   const Real* predicted;             ///< likewise
+  Real* held = nullptr;              ///< rigid bodies: coupling points, likewise
+  double* couple = nullptr;          ///< rigid bodies: [cell][3] torque of the next step
   std::size_t batch_size() const { return static_cast<std::size_t>(vertices) * 3 * lanes_of<Real>; }
 };
 

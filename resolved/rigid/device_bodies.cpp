@@ -21,18 +21,25 @@ DeviceBodies<Real>::DeviceBodies(Queue& queue, const RigidBodies<Real>& host)
   const std::size_t n = static_cast<std::size_t>(count_);
   anchor_ = Array<double>(3 * n, queue.place());
   motion_ = Array<BodyMotion>(n, queue.place());
-  for (auto* field : {&offset_, &velocity_, &normal_, &predicted_})
+  couple_ = Array<Vec3>(n, queue.place());
+  for (auto* field : {&offset_, &held_now_, &velocity_, &normal_, &predicted_})
     *field = Array<Real>(3 * n * static_cast<std::size_t>(pitch), queue.place());
-  fields_ = {host.vertices(),  pitch,          anchor_.data(),   offset_.data(),
-             velocity_.data(), normal_.data(), predicted_.data()};
+  fields_ = {host.vertices(),  pitch,          anchor_.data(),    offset_.data(),
+             velocity_.data(), normal_.data(), predicted_.data(), held_now_.data()};
   upload(host);
 }
 
 template <class Real>
 typename DeviceBodies<Real>::Step DeviceBodies<Real>::body(const StepOptions&) const {
   auto* self = const_cast<DeviceBodies*>(this);  // the kernel writes through these pointers
-  return {fields_,        gyration_,           arm_.data(), held_.data(), shape_normal_.data(),
-          metric_.data(), self->motion_.data()};
+  return {fields_,
+          gyration_,
+          arm_.data(),
+          held_.data(),
+          shape_normal_.data(),
+          metric_.data(),
+          self->motion_.data(),
+          self->couple_.data()};
 }
 
 template <class Real>
@@ -49,7 +56,7 @@ void DeviceBodies<Real>::upload(const RigidBodies<Real>& host) {
           "the device's bodies anew");
   Array<double> anchor(anchor_.size());
   std::vector<BodyMotion> motion(static_cast<std::size_t>(count_));
-  Array<Real> offset(offset_.size()), velocity(offset_.size()), normal(offset_.size());
+  Array<Real> offset(offset_.size()), held(offset_.size()), velocity(offset_.size()), normal(offset_.size());
   std::vector<std::byte> state(host.state_bytes());
   const auto at = host.layout();
   for (int c = 0; c < count_; ++c) {
@@ -60,12 +67,14 @@ void DeviceBodies<Real>::upload(const RigidBodies<Real>& host) {
     for (int k = 0; k < vertices(); ++k)
       for (int d = 0; d < 3; ++d) {
         const std::size_t i = fields_.at(c, d, k), h = at.at(c, k, d);
-        offset[i] = host.offsets()[h], velocity[i] = host.velocities()[h], normal[i] = host.normals()[h];
+        offset[i] = host.offsets()[h], held[i] = host.held()[h], velocity[i] = host.velocities()[h],
+        normal[i] = host.normals()[h];
       }
   }
   queue_.copy(anchor_.data(), anchor.data(), anchor.size());
   queue_.copy(motion_.data(), motion.data(), motion.size());
   queue_.copy(offset_.data(), offset.data(), offset.size());
+  queue_.copy(held_now_.data(), held.data(), held.size());
   queue_.copy(velocity_.data(), velocity.data(), velocity.size());
   queue_.copy(normal_.data(), normal.data(), normal.size());
   queue_.wait();
@@ -110,7 +119,7 @@ StepReport DeviceBodies<Real>::report() const {
 
 template <class Real>
 std::size_t DeviceBodies<Real>::memory_bytes() const {
-  return 4 * offset_.size() * sizeof(Real) + motion_.size() * sizeof(BodyMotion);
+  return 5 * offset_.size() * sizeof(Real) + motion_.size() * sizeof(BodyMotion);
 }
 
 static_assert(sizeof(BodyMotion) == 10 * sizeof(double), "as RigidBodies::save lays it out");

@@ -22,6 +22,8 @@ class DeviceBodies {
   std::size_t shared_bytes() const { return Step::shared_bytes(); }
   /// Enqueues one step of all bodies from fields().predicted. RigidBodies::step defines what it does.
   void step(const StepOptions& options = {});
+  /// [cell] torque beside what v_pred carries, for the next step.
+  Vec3* couples() { return couple_.data(); }
 
   void upload(const RigidBodies<Real>& host);
   void download(RigidBodies<Real>& host) const;
@@ -36,7 +38,8 @@ class DeviceBodies {
   Array<Vec3> arm_, held_, shape_normal_;
   Array<double> metric_, anchor_;
   Array<BodyMotion> motion_;
-  Array<Real> offset_, velocity_, normal_, predicted_;
+  Array<Vec3> couple_;
+  Array<Real> offset_, held_now_, velocity_, normal_, predicted_;
 };
 
 extern template class DeviceBodies<float>;

@@ -22,11 +22,12 @@ struct BodyStep {
   const Vec3 *arm, *held, *normal;  ///< [vertices] body frame: vertices, held points (BodyType), normals
   const double* metric;             ///< [vertices]
   BodyMotion* motion;               ///< [cell]
+  Vec3* couple;                     ///< [cell] torque beside what v_pred carries; forgotten after the step
 
   /// The same for the bodies from \p first on.
   BodyStep from(std::size_t first) const {
     BodyStep s = *this;
-    s.cells = cells.from(first), s.motion += first;
+    s.cells = cells.from(first), s.motion += first, s.couple += first;
     return s;
   }
 
@@ -66,7 +67,8 @@ struct BodyStep {
   }
 
   HEMO_HD void find_motion(unsigned cell, Shared& s) const {
-    Vec3 linear{0, 0, 0}, angular{0, 0, 0};
+    Vec3 linear{0, 0, 0}, angular = mesh::scale(gyration.h, couple[cell]);
+    couple[cell] = {0, 0, 0};
     for (int w = 0; w < workers; ++w)
       mesh::accumulate(linear, 1, s.linear[w]), mesh::accumulate(angular, 1, s.angular[w]);
     BodyMotion& m = motion[cell];
@@ -86,11 +88,13 @@ struct BodyStep {
     const Turn step(s.turn);
     for (int k = me; k < cells.vertices; k += threads) {
       const auto chord = step.chord(mesh::transform(s.before, held[k]));
-      const auto r = mesh::transform(s.after, arm[k]), n = mesh::transform(s.after, normal[k]);
+      const auto r = mesh::transform(s.after, arm[k]), n = mesh::transform(s.after, normal[k]),
+                 q = mesh::transform(s.after, held[k]);
       for (int d = 0; d < 3; ++d) {
         const std::size_t i = cells.at(cell, d, k);
         cells.velocity[i] = static_cast<Real>(s.velocity[d] + chord[d] / gyration.h);
         cells.offset[i] = static_cast<Real>(r[d]);
+        cells.held[i] = static_cast<Real>(q[d]);
         cells.normal[i] = static_cast<Real>(n[d]);
       }
     }

@@ -317,10 +317,15 @@ int RigidBodies<Real>::load(const std::byte* in) {
 
 template <class Real>
 mesh::HostFields<Real> RigidBodies<Real>::host_fields() {
-  return {impl_->vertices,        batches(),
-          impl_->anchor.data(),   impl_->offset.data(),
-          impl_->velocity.data(), impl_->normal.data(),
-          impl_->predicted.data()};
+  return {impl_->vertices,
+          batches(),
+          impl_->anchor.data(),
+          impl_->offset.data(),
+          impl_->velocity.data(),
+          impl_->normal.data(),
+          impl_->predicted.data(),
+          impl_->held.data(),
+          impl_->couple.empty() ? nullptr : impl_->couple.front().data()};
 }
 
 template <class Real>

@@ -1,11 +1,13 @@
 /// \file The walk's own random numbers and elementary functions against Random123 and the standard library.
 
+#include <Random123/philox.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <random>
 
+#include "coarse/lanes.hpp"
 #include "coarse/normal.hpp"
 #include "coarse/walk.hpp"
 #include "core/statistics.hpp"
@@ -15,6 +17,26 @@ namespace hemowalk::coarse {
 namespace {
 
 using Wide = Lanes<16>;
+
+TEST(RandomBits, AreRandom123s) {
+  std::mt19937_64 any(3);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const std::uint64_t seed = any();
+    r123::Philox4x32::ctr_type counter;
+    RandomBits mine;
+    for (int w = 0; w < 4; ++w) counter[w] = mine.word[w] = static_cast<std::uint32_t>(any() >> (trial % 64));
+    const r123::Philox4x32::key_type key = {
+        {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
+    const auto expected = r123::Philox4x32()(counter, key);
+    mine = philox_bits(mine, seed);
+    for (int w = 0; w < 4; ++w) ASSERT_EQ(mine.word[w], expected[w]);
+  }
+  // known answers of the library's own tests: the step's upper byte belongs to the stream
+  const RandomBits zero = philox_bits({{0, 0, 0, 0}}, 0);
+  EXPECT_EQ(zero.word[0], 0x6627e8d5u);
+  EXPECT_EQ(zero.word[3], 0x9b00dbd8u);
+  EXPECT_NE(random_bits(1, Stream::test, 2, 3).word[0], random_bits(1, Stream::initial, 2, 3).word[0]);
+}
 
 TEST(LanePhilox, EqualsRandom123InEveryLane) {
   std::mt19937_64 any(7);

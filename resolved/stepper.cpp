@@ -1,0 +1,71 @@
+#include "resolved/stepper.hpp"
+
+#include "core/check.hpp"
+#include "resolved/device_simulation.hpp"
+#include "resolved/device_solid.hpp"
+
+namespace hemowalk::resolved {
+
+std::string place_problem(const data::Scene& scene) {
+  const auto& p = scene.place;
+  if (p.fluid == p.coupling && (p.coupling == p.solid || p.fluid == Place::host)) return {};
+  return "place: this combination is not available (everything on one place, or the solid alone on the "
+         "device) set "
+         "fluid and coupling alike";
+}
+
+template <class Real>
+struct Stepper<Real>::Impl {
+  Simulation<Real>& simulation;
+  Queue queue;
+  std::unique_ptr<DeviceSimulation<Real>> whole;
+  std::unique_ptr<DeviceSolid<Real>> solid;
+
+  Impl(Simulation<Real>& s, Place place) : simulation(s), queue(place) {}
+};
+
+template <class Real>
+Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
+  const auto& place = simulation.scene().place;
+  const std::string problem = place_problem(simulation.scene());
+  require(problem.empty(), problem);
+  const bool any = place.solid == Place::device;
+  impl_ = std::make_unique<Impl>(simulation, any ? device : Place::host);
+  if (!any) return;
+  require(
+      simulation.ranks().count() == 1,
+      "place: device on several ranks (the device's kernels know one block) use one rank, or place: host");
+  if (place.fluid == Place::device) {
+    impl_->whole = std::make_unique<DeviceSimulation<Real>>(impl_->queue, simulation);
+  } else {
+    impl_->solid = std::make_unique<DeviceSolid<Real>>(device, simulation.groups());
+    simulation.set_solid_step(
+        [solid = impl_->solid.get()](const mesh::StepOptions& options) { return solid->step(options); });
+  }
+}
+
+template <class Real>
+Stepper<Real>::~Stepper() {
+  if (impl_ && impl_->solid) impl_->simulation.set_solid_step({});
+}
+
+template <class Real>
+void Stepper<Real>::step() {
+  impl_->whole ? impl_->whole->step() : impl_->simulation.step();
+}
+
+template <class Real>
+void Stepper<Real>::sync() {
+  if (impl_->whole) impl_->whole->download(impl_->simulation);
+  if (impl_->solid) impl_->solid->download();
+}
+
+template <class Real>
+std::int64_t Stepper<Real>::fluid_steps() const {
+  return impl_->whole ? impl_->whole->fluid_steps() : impl_->simulation.fluid_steps();
+}
+
+template class Stepper<float>;
+template class Stepper<double>;
+
+}  // namespace hemowalk::resolved
