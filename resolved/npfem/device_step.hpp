@@ -5,7 +5,7 @@
 ///
 /// The constant matrix is applied as its dense inverse, one row per thread: 258 x 258 numbers in single
 /// precision are 266 kB and stay in the second-level cache for all cells, where triangular sweeps would be 2
-/// x 258 dependent steps (docs/adr/0009).
+/// x 258 dependent steps (docs/adr/0010).
 
 #include "core/device.hpp"
 #include "resolved/mesh/cell_fields.hpp"
