@@ -6,4 +6,5 @@ if(TARGET hemowalk_resolved)
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
+  hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
 endif()
