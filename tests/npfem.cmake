@@ -15,3 +15,5 @@ if(benchmark_FOUND)
   add_executable(bench_npfem benchmarks/bench_npfem.cpp)
   target_link_libraries(bench_npfem PRIVATE hemowalk_npfem hemowalk_rigid benchmark::benchmark)
 endif()
+
+hemowalk_test(validate_solid SOURCES validation/test_solid_experiments.cpp LINK hemowalk_npfem LABELS validation TIMEOUT 1200)

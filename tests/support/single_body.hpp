@@ -94,12 +94,14 @@ inline double stokes_radius(const BodyCase& c, int axis) {
   const double mean = (m.fluid[axis] + m.cells[axis]) / (n * n * n);
   const auto& body = std::get<rigid::RigidBodies<double>>(sim.groups()[0].cells);
   const double speed = body.velocity(0)[axis] - mean;
-  double a = 1;
-  for (int i = 0; i < 100; ++i) {
-    const double r = a / n;
-    a = force / (6 * M_PI * viscosity * speed) * (1 - 2.8373 * r + 4.19 * r * r * r - 27.4 * std::pow(r, 6));
+  // F/(6 pi mu U) = a/(1 - 2.8373 r + 4.19 r^3 - 27.4 r^6), r = a/n, rises with a up to r = 0.3.
+  double low = 0, high = 0.3 * n;
+  for (int i = 0; i < 60; ++i) {
+    const double a = (low + high) / 2, r = a / n;
+    const double drag = a / (1 - 2.8373 * r + 4.19 * r * r * r - 27.4 * std::pow(r, 6));
+    (drag < force / (6 * M_PI * viscosity * speed) ? low : high) = a;
   }
-  return a * c.dx;
+  return low * c.dx;
 }
 
 /// Radius of the sphere with the drag of an ellipsoid along its axis \p axis (Oberbeck 1876):

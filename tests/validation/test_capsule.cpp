@@ -1,0 +1,128 @@
+// A neo-Hookean capsule in shear, viscosity ratio 1, against three published curves (Pozrikidis 1995,
+// Ramanujan and Pozrikidis 1998, Doddi and Bagchi 2008), at a = 5 dx and extrapolated in box and dx. Ca = mu
+// gamma a/(3 Gs). Prints the tables of docs/evidence/validation.md. HEMOWALK_CAPSULE=full adds a = 10 dx
+// (half an hour).
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "support/red_cells.hpp"
+#include "support/reference_data.hpp"
+#include "support/single_body.hpp"
+
+namespace hemowalk::resolved {
+namespace {
+
+struct Capsule {
+  double Ca = 0.1, nodes = 5, box = 6;  // a in dx, box in a
+  double acceleration = 50;             // Re = gamma a^2/nu = 6.25e-4 times this
+  double retraction = data::Coupling{}.retraction;
+};
+
+struct Deformation {
+  std::vector<double> strain, D;
+  double volume = 1;  // at the end over the start
+  double at(double t) const {
+    for (std::size_t i = 1; i < strain.size(); ++i)
+      if (t <= strain[i])
+        return D[i - 1] + (D[i] - D[i - 1]) * (t - strain[i - 1]) / (strain[i] - strain[i - 1]);
+    return D.back();
+  }
+};
+
+constexpr double end = 6;  // strain; the references are steady from 3 on
+
+Deformation shear(const Capsule& c) {
+  const double a = 2.5e-6, rate = 100, box = c.box * a * 1e6;
+  data::Kind kind;
+  kind.name = "capsule", kind.shape = test::sphere_shape(2.5), kind.law = data::Kind::Law::neo_hookean;
+  kind.subdivision = static_cast<int>(std::lround(1.6 * c.nodes));
+  kind.Gs = 1025e-6 * rate * a / (3 * c.Ca);
+  kind.kappa_damping = 0, kind.bending.model = data::Bending::Model::none, kind.volume_modulus = 50 * kind.Gs;
+  kind.density = 1025;
+  auto scene = test::shear_scene({box, box, box}, c.acceleration, {kind});
+  scene.fluid.dx = a / c.nodes, scene.coupling.retraction = c.retraction;
+  const double middle = c.box * c.nodes / 2;
+  Simulation<float> sim(scene, {{0, {middle + 0.2, middle, middle}, mesh::identity_rotation, {}}});
+  const double per_step = sim.units().rate(rate);
+  const int steps = static_cast<int>(end / per_step), every = steps / 60;
+  Deformation out{{0}, {0}, 1};
+  const double volume = test::observe(sim, 0, 0).volume;
+  for (int i = 1; i <= steps; ++i) {
+    sim.step();
+    if (i % every) continue;
+    const auto o = test::observe(sim, 0, 0);
+    out.strain.push_back(i * per_step), out.D.push_back(o.taylor_deformation), out.volume = o.volume / volume;
+  }
+  return out;
+}
+
+double steady(const Deformation& d) { return d.at(end); }
+
+struct References {
+  std::vector<test::Curve> curves;
+  explicit References(const std::string& folder, const std::string& Ca)
+      : curves{test::Curve(folder + "/nh_shear_3d__pozrikidis1995_ca_" + Ca + ".csv"),
+               test::Curve(folder + "/nh_shear_3d__pozrikidis1998_ca_" + Ca + ".csv"),
+               test::Curve(folder + "/nh_shear_3d__bagchi_ca" + Ca + ".csv")} {}
+  double mean(double t) const {
+    double sum = 0, n = 0;
+    for (const auto& c : curves)
+      if (c.covers(t)) sum += c(t), n += 1;
+    return sum / n;
+  }
+  // Steady value: mean of the last values of those that get there.
+  double steady() const { return (curves[1](curves[1].last()) + curves[2](curves[2].last())) / 2; }
+};
+
+struct Tolerance {
+  double raw, extrapolated;
+};
+
+void compare(const std::string& Ca, const Tolerance& tolerance) {
+  const std::string folder = test::reference_folder("capsule_neo_hookean");
+  if (folder.empty()) GTEST_SKIP() << "no shared/data/capsule_neo_hookean beside the repository";
+  const References reference(folder, Ca);
+  const bool full = std::getenv("HEMOWALK_CAPSULE") != nullptr;
+  Capsule c;
+  c.Ca = std::atof(Ca.c_str());
+  std::vector<Deformation> runs{shear(c)};
+  c.box = 9;
+  const Deformation wide = shear(c);
+  c.box = 6, c.acceleration = 100, c.nodes = 7.5;
+  runs.push_back(shear(c));
+  if (full) c.nodes = 10, runs.push_back(shear(c));
+  std::printf("Ca %s  strain: a/dx = 5, 7.5%s | a/dx = 5 in the wide box | references\n", Ca.c_str(),
+              full ? ", 10" : "");
+  for (const double t : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
+    std::printf("%.1f:", t);
+    for (const auto& r : runs) std::printf(" %.4f", r.at(t));
+    std::printf(" | %.4f | %.4f\n", wide.at(t), t < 5 ? reference.mean(t) : reference.steady());
+  }
+  // Images: the disturbance of a force-free body falls with the cube of the distance. The error in dx was
+  // seen to be of order 1 (a = 5, 7.5, 10 dx at Ca 0.1: differences 0.0117 and 0.0061).
+  const double box_correction = (steady(wide) - steady(runs[0])) / (1 - std::pow(6.0 / 9, 3));
+  const double fine = steady(runs.back()), coarse = steady(runs[runs.size() - 2]),
+               ratio = full ? 10 / 7.5 : 1.5;
+  const double raw = steady(runs[0]) / reference.steady() - 1,
+               extrapolated =
+                   (fine + (fine - coarse) / (ratio - 1) + box_correction) / reference.steady() - 1;
+  std::printf(
+      "strain 6 against the references' steady mean %.4f: a = 5 dx, box 6 a: %+.1f %%; extrapolated in box "
+      "and "
+      "dx (order 1): %+.1f %%; volume %.5f\n",
+      reference.steady(), 100 * raw, 100 * extrapolated, runs[0].volume);
+  EXPECT_LT(std::abs(raw), tolerance.raw);
+  EXPECT_LT(std::abs(extrapolated), tolerance.extrapolated);
+  for (const auto& r : runs) EXPECT_NEAR(r.volume, 1, 0.002);
+}
+
+// What was reached (docs/evidence/validation.md), not what is wanted: 2.5 % at Ca 0.1 and 5 % at 0.05,
+// extrapolated.
+TEST(Capsule, DeformsAsPublishedAtCa01) { compare("0.1", {0.06, 0.06}); }
+TEST(Capsule, DeformsAsPublishedAtCa005) { compare("0.05", {0.10, 0.06}); }
+
+}  // namespace
+}  // namespace hemowalk::resolved
