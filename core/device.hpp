@@ -377,6 +377,11 @@ class Queue {
 /// others.
 template <class T>
 Array<T> place_copy(Place place, const Array<T>& source) {
+  if (place == Place::host && source.place() == Place::host) {  // also where the CUDA library finds no driver
+    Array<T> copy(source.size());
+    if (source.size()) std::memcpy(static_cast<void*>(copy.data()), source.data(), source.size() * sizeof(T));
+    return copy;
+  }
   Array<T> copy = copy_to(place, source);
 #if defined(HEMOWALK_CUDA)
   if (place == Place::device) detail::check(cudaDeviceSynchronize(), "a copy to the device");
