@@ -119,6 +119,9 @@ void Markers<Real>::assign(const std::vector<std::int32_t>& body_of) {
   };
   fit(sites_, active_ + lanes), fit(marker_, active_);
   fit(slot_, count_), fit(home_, count_), fit(tile_, count_);
+  // Unused slots are saved too: the same whatever was there before.
+  std::fill(slot_.begin(), slot_.end(), 0u);
+  std::fill(home_.begin(), home_.end(), Home{});
   sorted_ = false;
 }
 
