@@ -34,7 +34,7 @@ template <class T>
 HEMO_HD HEMO_INLINE Retraction<T> retraction(const T& delta, const Vector<T>& s, const Vector<T>& r,
                                              const Vector<T>& J) {
   using std::sqrt;
-  const T inverse = T(1) / sqrt(dot(s, s) + std::numeric_limits<T>::min());
+  const T inverse = T(1) / sqrt(dot(s, s) + T(std::numeric_limits<float>::min()));  // 0 for an idle lane
   const Vector<T> n = inverse * s;
   return {(delta * inverse) * (r - dot(n, r) * n), (delta * inverse) * (J - dot(n, J) * n)};
 }

@@ -1,67 +1,58 @@
 #pragma once
 /// \file Area normals of many cells side by side, their rates, and the couples of the retracted coupling
-/// surface (docs/adr/0008): coupling.hpp, lane by lane. Fields are [vertex][3][lane].
+/// surface (docs/adr/0008): coupling.hpp with a pack per number. Fields are [vertex][3][lane].
 
 #include <array>
 
 #include "core/block.hpp"
+#include "core/simd.hpp"
 #include "resolved/coupling.hpp"
 
 namespace hemowalk::resolved {
 
-/// Lane l of vertex k in a field [vertex][3][lane].
+/// Vertex k of a field, all lanes.
 template <int lanes, class Real>
-HEMO_INLINE Vector<Real> at_lane(const Real* field, int k, int l) {
-  const Real* p = field + 3 * k * lanes + l;
-  return {p[0], p[lanes], p[2 * lanes]};
+HEMO_INLINE Vector<Pack<Real, lanes>> all_lanes(const Real* field, int k) {
+  const Real* p = field + 3 * k * lanes;
+  return {load<Real, lanes>(p), load<Real, lanes>(p + lanes), load<Real, lanes>(p + 2 * lanes)};
 }
 template <int lanes, class Real>
-HEMO_INLINE void set_lane(const Vector<Real>& v, Real* field, int k, int l) {
-  Real* p = field + 3 * k * lanes + l;
-  p[0] = v.x, p[lanes] = v.y, p[2 * lanes] = v.z;
+HEMO_INLINE void set_lanes(const Vector<Pack<Real, lanes>>& v, Real* field, int k) {
+  Real* p = field + 3 * k * lanes;
+  store<Real, lanes>(v.x, p), store<Real, lanes>(v.y, p + lanes), store<Real, lanes>(v.z, p + 2 * lanes);
 }
 
-/// A triangle's area vector and its rate, added to the three corners. [vertex][3][lane]
+/// A triangle's area vector and its rate, added to the three corners.
 template <int lanes, class Real>
 HEMO_INLINE void add_normals(const std::array<int, 3>& t, const Real* x, const Real* v, Real* sum,
                              Real* rate) {
-#pragma omp simd
-  for (int l = 0; l < lanes; ++l) {
-    const Vector<Real> x0 = at_lane<lanes>(x, t[0], l), v0 = at_lane<lanes>(v, t[0], l);
-    const AreaVector<Real> area =
-        area_vector(at_lane<lanes>(x, t[1], l) - x0, at_lane<lanes>(x, t[2], l) - x0,
-                    at_lane<lanes>(v, t[1], l) - v0, at_lane<lanes>(v, t[2], l) - v0);
-    for (int i = 0; i < 3; ++i) {
-      set_lane<lanes>(at_lane<lanes>(sum, t[i], l) + area.normal, sum, t[i], l);
-      set_lane<lanes>(at_lane<lanes>(rate, t[i], l) + area.rate, rate, t[i], l);
-    }
+  const auto x0 = all_lanes<lanes>(x, t[0]), v0 = all_lanes<lanes>(v, t[0]);
+  const auto area = area_vector(all_lanes<lanes>(x, t[1]) - x0, all_lanes<lanes>(x, t[2]) - x0,
+                                all_lanes<lanes>(v, t[1]) - v0, all_lanes<lanes>(v, t[2]) - v0);
+  for (int i = 0; i < 3; ++i) {
+    set_lanes<lanes, Real>(all_lanes<lanes>(sum, t[i]) + area.normal, sum, t[i]);
+    set_lanes<lanes, Real>(all_lanes<lanes>(rate, t[i]) + area.rate, rate, t[i]);
   }
 }
 
 /// From the sum of area vectors round a vertex and its rate: rate <- delta dn/dt, sum <- the vertex's couple.
 template <int lanes, class Real>
 HEMO_INLINE void to_unit_normal(Real delta, const Node4<Real>* J, Real* sum, Real* rate) {
-#pragma omp simd
-  for (int l = 0; l < lanes; ++l) {
-    const Retraction<Real> r = retraction(delta, at_lane<lanes>(sum, 0, l), at_lane<lanes>(rate, 0, l),
-                                          Vector<Real>{J[l].x, J[l].y, J[l].z});
-    set_lane<lanes>(r.rate, rate, 0, l);
-    set_lane<lanes>(r.couple, sum, 0, l);
-  }
+  using P = Pack<Real, lanes>;
+  const Vector<P> impulse{P([&](auto l) { return J[l].x; }), P([&](auto l) { return J[l].y; }),
+                          P([&](auto l) { return J[l].z; })};
+  const auto r = retraction(P(delta), all_lanes<lanes>(sum, 0), all_lanes<lanes>(rate, 0), impulse);
+  set_lanes<lanes, Real>(r.rate, rate, 0);
+  set_lanes<lanes, Real>(r.couple, sum, 0);
 }
 
 /// Forces of the couples on the corners of a triangle.
 template <int lanes, class Real>
 HEMO_INLINE void add_couples(const std::array<int, 3>& t, const Real* x, const Real* g, Real* force) {
-#pragma omp simd
-  for (int l = 0; l < lanes; ++l) {
-    const Vector<Real> sum =
-        at_lane<lanes>(g, t[0], l) + at_lane<lanes>(g, t[1], l) + at_lane<lanes>(g, t[2], l);
-    const Vector<Real> p[3] = {at_lane<lanes>(x, t[0], l), at_lane<lanes>(x, t[1], l),
-                               at_lane<lanes>(x, t[2], l)};
-    set_lane<lanes>(at_lane<lanes>(force, t[0], l) + couple_force(sum, p[1], p[2]), force, t[0], l);
-    set_lane<lanes>(at_lane<lanes>(force, t[1], l) + couple_force(sum, p[2], p[0]), force, t[1], l);
-    set_lane<lanes>(at_lane<lanes>(force, t[2], l) + couple_force(sum, p[0], p[1]), force, t[2], l);
+  const auto sum = all_lanes<lanes>(g, t[0]) + all_lanes<lanes>(g, t[1]) + all_lanes<lanes>(g, t[2]);
+  for (int i = 0; i < 3; ++i) {
+    const auto from = all_lanes<lanes>(x, t[(i + 1) % 3]), to = all_lanes<lanes>(x, t[(i + 2) % 3]);
+    set_lanes<lanes, Real>(all_lanes<lanes>(force, t[i]) + couple_force(sum, from, to), force, t[i]);
   }
 }
 
