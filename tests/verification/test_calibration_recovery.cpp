@@ -4,10 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "calibration/calibration.hpp"
 #include "calibration/synthetic.hpp"
+#include "core/random.hpp"
 
 namespace {
 
@@ -33,6 +35,49 @@ TEST(Recovery, ReflectingSlab) {
   EXPECT_EQ(c.law.step_law.kind, "gaussian");
   EXPECT_LE(c.law.valid.dt_min, 2e-3);
   EXPECT_NEAR(c.law.core.D, s.D, limit * c.law.core.D_sigma);
+}
+
+// Enough cells that an estimator wrong by 5 % would be four and a half standard errors off, or more.
+TEST(Recovery, FivePercentWouldBeSeen) {
+  Synthetic s;
+  s.platelets = 1500;
+  s.gap = 200e-6;
+  const Calibration c = calibrate_one(s);
+  for (const char* name : {"plateau", "gls", "green_kubo", "confined", "local", "without_jumps"}) {
+    EXPECT_LT(std::abs(z(*c.find(name), s.D)), limit) << name;
+    EXPECT_LT(c.find(name)->sigma, 0.011 * s.D) << name;
+  }
+}
+
+// A drift v = v0 sin(2 pi y/H) towards the middle, D constant, started from its equilibrium exp(int v/D).
+TEST(Recovery, DriftHasItsSignAndSize) {
+  constexpr double H = 50e-6, D = 1e-10, v0 = 15e-6, dt = 1e-3;
+  constexpr std::size_t cells = 1000, samples = 1001;
+  const auto drift = [&](double y) { return v0 * std::sin(2 * M_PI * y / H); };
+  Synthetic s;
+  s.platelets = cells;
+  data::Trajectories t = generate(s);
+  ASSERT_EQ(t.time.size(), samples);
+  auto& p = t.kinds["platelet"].position;
+  for (std::size_t n = 0; n < cells; ++n) {
+    RandomSequence random(1, Stream::test, n);
+    double y = 0;
+    do y = H * random.uniform();
+    while (random.uniform() > std::exp(v0 * H / (2 * M_PI * D) * (-1 - std::cos(2 * M_PI * y / H))));
+    for (std::size_t k = 0; k < samples; ++k) {
+      p[(k * cells + n) * 3 + 1] = y;
+      y += drift(y) * dt + std::sqrt(2 * D * dt) * random.normal();
+      y = std::abs(y);
+      if (y > H) y = 2 * H - y;
+    }
+  }
+  const Calibration c = calibrate({t}, Options{});
+  for (const double at : {0.25 * H, 0.75 * H}) {
+    const auto& y = c.smooth.y;
+    const auto k = static_cast<std::size_t>(std::lower_bound(y.begin(), y.end(), at) - y.begin());
+    EXPECT_NEAR(c.smooth.v[k], drift(y[k]), 4 * c.smooth.v_sigma[k]) << at;
+    EXPECT_GT(std::abs(drift(y[k])), 5 * c.smooth.v_sigma[k]) << "too weak a test";
+  }
 }
 
 TEST(Recovery, NarrowSlabNeedsTheWallCorrection) {
@@ -62,6 +107,18 @@ TEST(Recovery, LocalDWallToWall) {
   }
   EXPECT_LT(chi, 30);  // 9 heights, 8 um apart: chi-squared with 9 degrees of freedom, p = 4e-4
   EXPECT_FALSE(c.law.profile.D_draws.empty());
+  // Kramers-Moyal away from the walls: the mean displacement over time is D', so the drift without D' is
+  // zero. Its projection on D' has unit variance; without the subtraction it would be `power`.
+  double projection = 0, power = 0;
+  for (std::size_t k = 0; k < c.profile.y.size(); ++k) {
+    const double y = c.profile.y[k];
+    if (y < 6e-6 || y > s.gap - 6e-6 || !std::isfinite(c.profile.v[k])) continue;
+    const double slope = -s.D * s.D_contrast * 2 * M_PI / s.gap * std::sin(2 * M_PI * y / s.gap);
+    projection += c.profile.v[k] * slope / std::pow(c.profile.v_sigma[k], 2);
+    power += std::pow(slope / c.profile.v_sigma[k], 2);
+  }
+  EXPECT_GT(std::sqrt(power), 7) << "too weak a test";
+  EXPECT_LT(std::abs(projection) / std::sqrt(power), limit);
 }
 
 TEST(Recovery, MemoryIsFoundAndTakenIntoAccount) {
@@ -73,6 +130,9 @@ TEST(Recovery, MemoryIsFoundAndTakenIntoAccount) {
   EXPECT_EQ(c.core_estimator, "memory");
   EXPECT_LT(std::abs(z(*c.find("memory"), s.D)), limit);
   EXPECT_LT(std::abs(z(*c.find("green_kubo"), s.D)), limit);
+  // From 20 ms on the line misses T exp(-t/T) only; a line through the origin would miss T/t, a fifth and
+  // more.
+  EXPECT_GT(c.find("gls")->D, 0.92 * s.D);
   ASSERT_FALSE(c.step_choices.empty());
   EXPECT_EQ(c.step_choices.front().best, "persistent");
 }
