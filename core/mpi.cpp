@@ -56,6 +56,8 @@ struct Ranks::Impl {
   MPI_Comm messages = MPI_COMM_NULL, collective = MPI_COMM_NULL, errors = MPI_COMM_NULL;
   std::vector<std::byte> told;  ///< the error this rank told the others
   bool failed = false;          ///< told or heard of an error: nobody waits any more
+  std::string heard;            ///< the error another rank told: every later wait throws it again
+  Exit heard_code = Exit::internal;
 
   explicit Impl(MPI_Comm comm) {
     if (comm == MPI_COMM_NULL) return;
@@ -73,6 +75,7 @@ struct Ranks::Impl {
 
   /// Throws the error of another rank, if one was told.
   void listen() {
+    if (!heard.empty()) throw Error(heard_code, heard);
     int there = 0;
     MPI_Status status;
     MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, errors, &there, &status);
@@ -82,7 +85,8 @@ struct Ranks::Impl {
     std::string text(static_cast<std::size_t>(length), '\0');
     MPI_Recv(text.data(), length, MPI_CHAR, status.MPI_SOURCE, status.MPI_TAG, errors, MPI_STATUS_IGNORE);
     failed = true;
-    throw Error(static_cast<Exit>(status.MPI_TAG), text);
+    heard = text, heard_code = static_cast<Exit>(status.MPI_TAG);
+    throw Error(heard_code, heard);
   }
 
   void tell(Exit code, const std::string& text) {
