@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/check.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
 namespace {
@@ -19,13 +20,6 @@ constexpr double independent = 0.1;
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[400];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
 
 Vector column(const std::vector<data::TransportLaw>& laws, const Regressor& r) {
   Vector x(static_cast<Eigen::Index>(laws.size()));
@@ -75,10 +69,10 @@ Trend trend_of(const Regressor& r, double coefficient, double sigma, const Vecto
   t.centre = x.mean();
   t.range = {x.minCoeff(), x.maxCoeff()};
   t.claimed = std::abs(coefficient) > claim * sigma;
-  t.statement = t.claimed ? text("ln D changes by %.2g +- %.2g per unit of %s (%.1f standard errors)",
-                                 coefficient, sigma, r.name.c_str(), std::abs(coefficient) / sigma)
-                          : text("effect of %s not distinguishable from none: %.2g +- %.2g", r.name.c_str(),
-                                 coefficient, sigma);
+  t.statement = t.claimed ? formatted("ln D changes by %.2g +- %.2g per unit of %s (%.1f standard errors)",
+                                      coefficient, sigma, r.name.c_str(), std::abs(coefficient) / sigma)
+                          : formatted("effect of %s not distinguishable from none: %.2g +- %.2g",
+                                      r.name.c_str(), coefficient, sigma);
   return t;
 }
 
@@ -95,8 +89,8 @@ void test(Hypothesis& h, const std::vector<Trend>& trends) {
                                                          : "contradicted";
   h.statement =
       h.claim +
-      text(": %s, slope %.2g +- %.2g against ", h.outcome.c_str(), found->coefficient, found->sigma) +
-      h.about + text(" (predicted %s)", h.sign > 0 ? "positive" : "negative");
+      formatted(": %s, slope %.2g +- %.2g against ", h.outcome.c_str(), found->coefficient, found->sigma) +
+      h.about + formatted(" (predicted %s)", h.sign > 0 ? "positive" : "negative");
 }
 
 void set_shear_exponent(ConditionFit& out, const std::vector<data::TransportLaw>& laws) {
@@ -137,8 +131,8 @@ void set_validity(ConditionFit& out, const std::vector<data::TransportLaw>& laws
     failed += !law.gate.passed;
   }
   if (failed)
-    out.warnings.push_back(text("%d of %zu calibrations fail the artefact gate: a trend may be an artefact's",
-                                failed, laws.size()));
+    out.warnings.push_back(formatted(
+        "%d of %zu calibrations fail the artefact gate: a trend may be an artefact's", failed, laws.size()));
 }
 
 }  // namespace

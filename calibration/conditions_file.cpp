@@ -9,6 +9,7 @@
 #include "core/check.hpp"
 #include "core/provenance.hpp"
 #include "core/random.hpp"
+#include "core/text.hpp"
 #include "core/units.hpp"
 
 namespace hemowalk::calibration {
@@ -19,13 +20,6 @@ using Laws = std::vector<data::TransportLaw>;
 using Json = nlohmann::ordered_json;
 
 constexpr double margin = 0.02;  // of a scale: conditions this near to a calibrated one count as the same
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[400];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
 
 /// What the calibrations span of one condition; shear rate and hematocrit as far as each of them vouches for.
 std::array<double, 2> span_of(const ConditionFit& fit, const Laws& laws, double Conditions::*member) {
@@ -48,8 +42,8 @@ Conditions completed(const ConditionFit& fit, const Laws& laws, Conditions at) {
     if (std::isfinite(x)) {
       if (span[0] <= x && x <= span[1]) continue;
       const bool known = span[0] <= span[1];
-      throw Refused(r.name + " is asked at " + text("%.4g", x) +
-                    (known ? text(" (the calibrations span %.4g to %.4g", span[0], span[1])
+      throw Refused(r.name + " is asked at " + formatted("%.4g", x) +
+                    (known ? formatted(" (the calibrations span %.4g to %.4g", span[0], span[1])
                            : std::string(" (it is not known in the calibrations")) +
                     "; beyond them the law is a guess) calibrate a run there");
     }

@@ -7,6 +7,7 @@
 #include "calibration/diffusivity.hpp"
 #include "calibration/resampling.hpp"
 #include "core/statistics.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
 namespace {
@@ -16,13 +17,6 @@ constexpr double uniform_stress = 0.1;  ///< largest spread of the stress over i
 constexpr double significant =
     3.5;  // standard errors; two-sided p = 5e-4, with about ten bins looked at: 0.5 %
 constexpr int velocity_bins = 12;
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[320];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
 
 data::Finding finding(const std::string& name, double value, double limit, bool passed,
                       const std::string& note) {
@@ -61,8 +55,8 @@ data::Finding fastest(const Ensemble& e, double wall_speed) {
   }
   const double ratio = most / (most_dt * wall_speed);
   return finding("max_displacement_over_wall", ratio, 1.25, ratio <= 1.25,
-                 text("fastest displacement %.3g um in %.3g ms; the wall moves %.3g um", most * 1e6,
-                      most_dt * 1e3, wall_speed * most_dt * 1e6));
+                 formatted("fastest displacement %.3g um in %.3g ms; the wall moves %.3g um", most * 1e6,
+                           most_dt * 1e3, wall_speed * most_dt * 1e6));
 }
 
 data::Finding jumps(const Ensemble& e) {
@@ -79,9 +73,10 @@ data::Finding jumps(const Ensemble& e) {
   const double share = n / all;
   return finding(
       "cross_stream_jumps", share, 1e-4, share <= 1e-4,
-      text("%.0f of %.0f displacements across the stream above %.3g um per sample, longest %.3g um: too fast "
-           "for red cells to cause",
-           n, all, limit * 1e6, most * 1e6));
+      formatted(
+          "%.0f of %.0f displacements across the stream above %.3g um per sample, longest %.3g um: too fast "
+          "for red cells to cause",
+          n, all, limit * 1e6, most * 1e6));
 }
 
 data::Finding vorticity(const CellVelocity& v, double wall_speed) {
@@ -98,9 +93,10 @@ data::Finding vorticity(const CellVelocity& v, double wall_speed) {
   }
   return finding(
       "vorticity_velocity_over_wall", std::abs(most) / wall_speed, 0.02, largest <= 0.02,
-      text("mean velocity along vorticity up to %.3g um/ms (at y = %.3g um, up to %.1f standard errors); "
-           "nothing drives a flow there",
-           most * 1e3, at * 1e6, score));
+      formatted(
+          "mean velocity along vorticity up to %.3g um/ms (at y = %.3g um, up to %.1f standard errors); "
+          "nothing drives a flow there",
+          most * 1e3, at * 1e6, score));
 }
 
 /// Whether the total shear stress was recorded and is the same at all heights.
@@ -129,10 +125,11 @@ void antisymmetry(const std::vector<double>& y, const std::vector<double>& u,
   const double limit = stress_is_uniform ? 0.25 : 0.1;
   out.push_back(finding(
       "velocity_antisymmetry", value, limit, value <= limit || z <= significant,
-      text("u(y) + u(mirror) varies by %.0f %% of the wall speed (%.0f standard errors): the halves shear "
-           "differently%s",
-           100 * value, z,
-           stress_is_uniform ? ", under the same stress: the cells are unevenly distributed" : "")));
+      formatted(
+          "u(y) + u(mirror) varies by %.0f %% of the wall speed (%.0f standard errors): the halves shear "
+          "differently%s",
+          100 * value, z,
+          stress_is_uniform ? ", under the same stress: the cells are unevenly distributed" : "")));
 }
 
 void shear(const std::vector<double>& y, const std::vector<double>& u, const std::vector<double>& sigma,
@@ -151,8 +148,8 @@ void shear(const std::vector<double>& y, const std::vector<double>& u, const std
   }
   if (high < low) return;
   const std::string where =
-      text("local shear %.0f 1/s at the bottom, %.0f .. %.0f in the core, %.0f at the top; nominal %.0f",
-           bottom.slope, low, high, top.slope, nominal);
+      formatted("local shear %.0f 1/s at the bottom, %.0f .. %.0f in the core, %.0f at the top; nominal %.0f",
+                bottom.slope, low, high, top.slope, nominal);
   out.push_back(finding("core_shear_over_nominal", low / nominal, 0.75,
                         low / nominal >= 0.75 || (0.75 * nominal - low) < significant * low_s, where));
   const double spread = (high - low) / nominal;
@@ -179,9 +176,9 @@ data::Finding both_walls(const Ensemble& e) {
   const double z = std::abs(top - bottom) / std::sqrt(std::max(variance, 1e-9));
   return finding(
       "wall_symmetry", ratio, 1.5, ratio <= 1.5 || z <= 2,
-      text("time-averaged cells within %.3g um of the walls: %.1f at the bottom, %.1f at the top (%.1f "
-           "standard errors apart)",
-           zone * 1e6, bottom, top, z));
+      formatted("time-averaged cells within %.3g um of the walls: %.1f at the bottom, %.1f at the top (%.1f "
+                "standard errors apart)",
+                zone * 1e6, bottom, top, z));
 }
 
 /// Time-averaged profile of the solver where it was recorded.
@@ -233,10 +230,10 @@ void stress(const FlowProfile& f, std::vector<data::Finding>& out) {
   if (f.stress.empty()) return;
   const auto [low, high] = std::minmax_element(f.stress.begin(), f.stress.end());
   const double middle = mean(f.stress), spread = (*high - *low) / std::abs(middle);
-  out.push_back(
-      finding("stress_uniformity", spread, uniform_stress, spread <= uniform_stress,
-              text("total shear stress %.4g .. %.4g Pa; in steady Couette flow it is the same at all heights",
-                   *low, *high)));
+  out.push_back(finding(
+      "stress_uniformity", spread, uniform_stress, spread <= uniform_stress,
+      formatted("total shear stress %.4g .. %.4g Pa; in steady Couette flow it is the same at all heights",
+                *low, *high)));
 }
 
 double largest(const std::vector<double>& values) {

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "core/statistics.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
 namespace {
@@ -167,12 +168,6 @@ struct StepModels {
   }
 };
 
-std::string text(const char* format, auto... args) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
-
 Calibration::StepChoice compare(const Ensemble& e, const Layer& core, const HalfFits& fits, double lag) {
   Calibration::StepChoice c;
   const auto k = static_cast<std::size_t>(e.steps(lag));
@@ -298,10 +293,10 @@ StepSelection select_step_law(const Ensemble& e, const Layer& core, const HalfFi
   while (first > 0 && s.choices[first - 1].best == "gaussian") --first;
   if (first < s.choices.size()) {
     s.dt_min = s.choices[first].lag;
-    s.reason = first == 0
-                   ? "unseen cells prefer no other law at any lag"
-                   : text("from %.3g ms on unseen cells prefer no other law (%s wins at %.3g ms)",
-                          s.dt_min * 1e3, s.choices[first - 1].best.c_str(), s.choices[first - 1].lag * 1e3);
+    s.reason = first == 0 ? "unseen cells prefer no other law at any lag"
+                          : formatted("from %.3g ms on unseen cells prefer no other law (%s wins at %.3g ms)",
+                                      s.dt_min * 1e3, s.choices[first - 1].best.c_str(),
+                                      s.choices[first - 1].lag * 1e3);
     return s;
   }
   if (s.choices.empty()) {
@@ -313,9 +308,9 @@ StepSelection select_step_law(const Ensemble& e, const Layer& core, const HalfFi
   s.law.kind = last.best;
   s.dt_min = e.interval;
   const bool persistent = last.best == "persistent";
-  s.reason = text("unseen cells prefer it to a Gaussian even at %.3g ms, by %.3g +- %.2g nats per step",
-                  last.lag * 1e3, persistent ? last.persistent_gain : last.heavy_tail_gain,
-                  persistent ? last.persistent_sigma : last.heavy_tail_sigma);
+  s.reason = formatted("unseen cells prefer it to a Gaussian even at %.3g ms, by %.3g +- %.2g nats per step",
+                       last.lag * 1e3, persistent ? last.persistent_gain : last.heavy_tail_gain,
+                       persistent ? last.persistent_sigma : last.heavy_tail_sigma);
   if (persistent) {
     // Correlation of successive steps of length t of an Ornstein-Uhlenbeck walk fixes T where the fit saw
     // none.

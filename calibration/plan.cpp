@@ -6,18 +6,10 @@
 
 #include "calibration/calibration.hpp"
 #include "core/check.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
-namespace {
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[320];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
-
-}  // namespace
+namespace {}  // namespace
 
 Plan plan_for(double relative_error, const PlanInput& in) {
   require(relative_error > 0 && relative_error < 1,
@@ -30,7 +22,7 @@ Plan plan_for(double relative_error, const PlanInput& in) {
   if (in.measured && in.measured->core.D_sigma > 0 && in.platelet_seconds > 0) {
     const double now = in.measured->core.D_sigma / in.measured->core.D;
     p.platelet_seconds = in.platelet_seconds * (now / relative_error) * (now / relative_error);
-    p.note = text("scaled from %.3g platelet-seconds that gave %.1f %%", in.platelet_seconds, 100 * now);
+    p.note = formatted("scaled from %.3g platelet-seconds that gave %.1f %%", in.platelet_seconds, 100 * now);
   } else {
     // Brownian, overlapping displacements: variance of the MSD (4/3) lag/time. Heavy tails and uneven layers
     // cost another factor 1.9 in the published run.

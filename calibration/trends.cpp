@@ -5,16 +5,10 @@
 
 #include "calibration/gate.hpp"
 #include "core/statistics.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
 namespace {
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[320];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
 
 /// Local shear of the cells' mean velocity at bin centres inside the layer, by centred differences over two
 /// bins.
@@ -55,8 +49,8 @@ ShearExponent shear_exponent(const Ensemble& e, const Layer& core, const LocalFi
   out.low = *std::min_element(s.rate.begin(), s.rate.end());
   out.high = *std::max_element(s.rate.begin(), s.rate.end());
   if (out.high < 1.3 * out.low) {
-    out.note =
-        text("local shear %.0f .. %.0f 1/s is too even to tell; n = 1 +- 0.3 assumed", out.low, out.high);
+    out.note = formatted("local shear %.0f .. %.0f 1/s is too even to tell; n = 1 +- 0.3 assumed", out.low,
+                         out.high);
     return out;
   }
   std::vector<double> draws;
@@ -64,14 +58,14 @@ ShearExponent shear_exponent(const Ensemble& e, const Layer& core, const LocalFi
   if (draws.size() < 2) return out;
   const double n = log_slope(s, fit.law), sigma = standard_deviation(draws);
   if (sigma > 0.3) {
-    out.note = text("n = %.2f +- %.2f says less than n = 1 +- 0.3, which is assumed", n, sigma);
+    out.note = formatted("n = %.2f +- %.2f says less than n = 1 +- 0.3, which is assumed", n, sigma);
     return out;
   }
   out.n = n;
   out.sigma = sigma;
   out.measured = true;
-  out.note = text("D ~ shear^(%.2f +- %.2f) over local shear %.0f .. %.0f 1/s inside the run", n, sigma,
-                  out.low, out.high);
+  out.note = formatted("D ~ shear^(%.2f +- %.2f) over local shear %.0f .. %.0f 1/s inside the run", n, sigma,
+                       out.low, out.high);
   return out;
 }
 

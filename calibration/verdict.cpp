@@ -7,16 +7,10 @@
 #include <limits>
 
 #include "core/check.hpp"
+#include "core/text.hpp"
 
 namespace hemowalk::calibration {
 namespace {
-
-template <class... Args>
-std::string text(const char* format, Args... args) {
-  char buffer[400];
-  std::snprintf(buffer, sizeof buffer, format, args...);
-  return buffer;
-}
 
 std::vector<double> range(const YAML::Node& n) {
   return n ? n.as<std::vector<double>>() : std::vector<double>{};
@@ -58,23 +52,23 @@ std::string mismatch(const Source& s, const Ours& o) {
     if (s.shear_rate.size() != 2)
       add("shear rate not stated");
     else if (!(o.shear_rate >= 0.75 * s.shear_rate[0] && o.shear_rate <= 1.25 * s.shear_rate[1]))
-      add(text("shear %g .. %g 1/s", s.shear_rate[0], s.shear_rate[1]));
+      add(formatted("shear %g .. %g 1/s", s.shear_rate[0], s.shear_rate[1]));
     if (s.hematocrit.size() != 2)
       add("hematocrit not stated");
     else if (!(o.hematocrit >= s.hematocrit[0] - 0.05 && o.hematocrit <= s.hematocrit[1] + 0.05))
-      add(text("hematocrit %g .. %g", s.hematocrit[0], s.hematocrit[1]));
+      add(formatted("hematocrit %g .. %g", s.hematocrit[0], s.hematocrit[1]));
   }
   return why;
 }
 
 /// The sentence: never just "validated".
 std::string sentence(const Source& s, const Ours& o, const Verdict& v, const std::string& differs) {
-  std::string out = text("%s (%s): %.3g m2/s", s.id.c_str(), s.kind.c_str(), v.D);
-  if (v.D_hi > v.D_lo) out += text(" (%.2g .. %.2g)", v.D_lo, v.D_hi);
-  out += text(", ours %.3g is %.2g times that", o.D, o.D / v.D);
+  std::string out = formatted("%s (%s): %.3g m2/s", s.id.c_str(), s.kind.c_str(), v.D);
+  if (v.D_hi > v.D_lo) out += formatted(" (%.2g .. %.2g)", v.D_lo, v.D_hi);
+  out += formatted(", ours %.3g is %.2g times that", o.D, o.D / v.D);
   if (std::isfinite(v.z))
-    out += text(", %.1f combined standard errors %s: %s", std::abs(v.z), v.z >= 0 ? "above" : "below",
-                std::abs(v.z) <= 2 ? "not distinguishable" : "they disagree");
+    out += formatted(", %.1f combined standard errors %s: %s", std::abs(v.z), v.z >= 0 ? "above" : "below",
+                     std::abs(v.z) <= 2 ? "not distinguishable" : "they disagree");
   else
     out += "; it states no error, so the distance cannot be put in standard errors";
   out +=

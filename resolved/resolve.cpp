@@ -71,7 +71,7 @@ class Run {
     const std::int64_t first = resume();
     if (schedule_.surface > 0 && root()) surfaces_ = make_surfaces();
     if (first == 0) {
-      if (root()) recorder_.trajectories().t_c = recovery_time(scene_);
+      if (root()) measure_recovery();
       outputs(0);
     }
     double last_checkpoint = omp_get_wtime();
@@ -105,6 +105,15 @@ class Run {
 
  private:
   static constexpr unsigned stop_flag = 1, checkpoint_flag = 2;
+
+  /// The shape-recovery time is a diagnostic: where it cannot be measured the run goes on and says so.
+  void measure_recovery() {
+    try {
+      recorder_.trajectories().t_c = recovery_time(scene_);
+    } catch (const Error& e) {
+      log_warning(std::string("shape-recovery time not measured: ") + e.what());
+    }
+  }
 
   bool root() const { return options_.ranks.root(); }
   std::string folder() const { return options_.out + "/checkpoint"; }
