@@ -57,6 +57,17 @@ data::TransportLaw::Conditions conditions_of(const std::vector<data::Trajectorie
 constexpr int profile_nodes = 65;
 constexpr std::size_t law_draws = 64;
 
+/// The law that half of the cells gives, as it would be handed on: \p law with its D(y) and v(y).
+data::TransportLaw law_of(const LocalFit& half, data::TransportLaw law) {
+  law.profile.D_draws.clear(), law.profile.v_draws.clear();
+  for (std::size_t k = 0; k < law.profile.y.size(); ++k) {
+    law.profile.D[k] = half.law.D(law.profile.y[k]);
+    law.profile.v[k] = half.law.v(law.profile.y[k]);
+  }
+  law.core.D = half.law.mean_D(law.core.y_range[0], law.core.y_range[1]);
+  return law;
+}
+
 /// Tabulates the smooth local law wall to wall, with the spread of its draws.
 void set_profile(Calibration& c, const LocalFit& fit) {
   auto& p = c.law.profile;
@@ -110,14 +121,23 @@ void set_walls(Calibration& c, const std::vector<data::Trajectories>& runs, cons
       residence(e, core, known ? std::max(c.law.cell_free_layer, 1e-6) : 4e-6 - std::max(0.0, outside));
 }
 
-void set_steps(Calibration& c, const Ensemble& e, const Layer& core, const Lags& lags) {
+void set_steps(Calibration& c, const Ensemble& e, const Layer& core, const Lags& lags, const Walk& walk) {
   const HalfFits halves = fit_halves(e, lags.plateau);
-  c.holdout = hold_out(e, core, halves);
+  c.holdout = hold_out(e, core, propagated(halves));
   const StepSelection steps = select_step_law(e, core, halves, lags.memory.memory);
   c.step_choices = steps.choices;
   c.step_reason = steps.law.kind + ": " + steps.reason;
   c.law.step_law = steps.law;
   c.law.valid.dt_min = steps.dt_min;
+  if (walk)
+    c.holdout_walk = hold_out(e, core, [&](std::size_t half, const std::vector<double>& at) {
+      const int n = halves[half].cells;
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      std::vector<Eigen::MatrixXd> P;
+      for (const auto& rows : walk(law_of(halves[half], c.law), e.walls, n, at))
+        P.emplace_back(Eigen::Map<const RowMajor>(rows.data(), n, n));
+      return P;
+    });
 }
 
 /// How D follows shear and hematocrit, and where the law may be used.
@@ -219,7 +239,7 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   c.law.gate = artefact_gate(runs, ensemble);
   set_profile(c, local);
   set_walls(c, runs, ensemble, core);
-  set_steps(c, ensemble, core, lags);
+  set_steps(c, ensemble, core, lags, options.walk);
   set_validity(c, ensemble, core, local);
   set_verdict(c, runs.front());
   set_warnings(c, runs.front(), lags.memory.at_limit);

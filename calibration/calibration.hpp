@@ -2,6 +2,7 @@
 /// \file The face of calibration: trajectories in, D with its uncertainty and a transport law out.
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,13 @@
 
 namespace hemowalk::calibration {
 
+/// A walk to be tested on unseen cells. With \p law between reflecting \p walls (m): for each of \p lags (s)
+/// the matrix P(i, j), row by row: the share of the walkers spread evenly over bin i at the start that are in
+/// bin j then; \p bins equal bins between the walls.
+using Walk = std::function<std::vector<std::vector<double>>(const data::TransportLaw& law,
+                                                            const std::array<double, 2>& walls, int bins,
+                                                            const std::vector<double>& lags)>;
+
 struct Options {
   std::string kind = "platelet";
   double t0 = 0.3;  ///< s, start of the window
@@ -19,6 +27,7 @@ struct Options {
   std::optional<double> lag;  ///< s; default: automatic plateau lag
   int bootstrap = 1000;
   std::uint64_t seed = 1;
+  Walk walk;  ///< the coarse walk, tested beside the fitted propagator; none = not tested
 };
 
 /// One estimate of D. sigma is one standard error; ci68 from the bootstrap.
@@ -68,12 +77,14 @@ struct Calibration {
   struct Kurtosis {
     std::vector<double> lag, excess;
   } kurtosis;
-  /// The walk fed with the law of one half of the cells, against the other half.
+  /// The law of one half of the cells, against the other half.
   struct Holdout {
     std::vector<double> lag, msd_ratio, msd_sigma;  ///< s; observed/predicted MSD of the core and its error
     std::vector<double> histogram_p;        ///< p-value of the displacements' histogram (PIT, 10 bins)
     double profile_lag = 0, profile_p = 0;  ///< s; p-value of the profile after the whole window
-  } holdout;
+  };
+  Holdout holdout;       ///< the law's own propagator
+  Holdout holdout_walk;  ///< Options::walk, fed with the law as it is handed on; empty without one
   /// Hold-out log-likelihood of the step laws at one lag, nats per step relative to the Gaussian.
   struct StepChoice {
     double lag = 0;  ///< s

@@ -25,9 +25,12 @@ Fold fold_of(const Ensemble& e, std::size_t parity) {
 /// Predictions of a fitted law over one lag, per starting cell of the grid.
 class Forecast {
  public:
-  Forecast(const LocalFit& fit, double lag)
-      : low_(fit.law.walls[0]), width_((fit.law.walls[1] - fit.law.walls[0]) / fit.cells), cells_(fit.cells) {
-    P_ = Propagator(fit.law, fit.cells, lag).matrix();
+  /// \p P over the walls' distance, in equal bins.
+  Forecast(const std::array<double, 2>& walls, Eigen::MatrixXd P)
+      : low_(walls[0]),
+        width_((walls[1] - walls[0]) / static_cast<double>(P.rows())),
+        cells_(static_cast<int>(P.rows())),
+        P_(std::move(P)) {
     cumulative_ = P_;
     for (int j = 1; j < cells_; ++j) cumulative_.col(j) += cumulative_.col(j - 1);
     for (int i = 0; i < cells_; ++i) {
@@ -66,6 +69,10 @@ class Forecast {
   Eigen::MatrixXd P_, cumulative_;
   std::vector<double> mean_, square_;
 };
+
+Forecast forecast(const LocalFit& fit, double lag) {
+  return {fit.law.walls, Propagator(fit.law, fit.cells, lag).matrix()};
+}
 
 LocalFit fit_half(const Ensemble& e, double lag, const Fold& use) {
   return fit_local_law(e, lag, Resampling(e, 0, 0), 0, use);
@@ -175,7 +182,7 @@ Calibration::StepChoice compare(const Ensemble& e, const Layer& core, const Half
   std::vector<double> persistent, heavy, steps;  // per unseen cell: gain over the Gaussian, in nats
   for (std::size_t half = 0; half < 2; ++half) {
     const Fold seen = fold_of(e, half);
-    const Forecast f(fits[half], c.lag);
+    const Forecast f = forecast(fits[half], c.lag);
     std::vector<Steps> train, test;
     for (std::size_t p = 0; p < e.paths.size(); ++p)
       (seen[p] ? train : test).push_back(standardised_steps(e, e.paths[p], core, f, k));
@@ -210,7 +217,7 @@ Calibration::StepChoice compare(const Ensemble& e, const Layer& core, const Half
 
 /// Share of steps beyond three standard deviations: what the tail law has to carry.
 double tail_share(const Ensemble& e, const Layer& core, const LocalFit& fit, double lag) {
-  const Forecast f(fit, lag);
+  const Forecast f = forecast(fit, lag);
   double n = 0, beyond = 0;
   for (const Path& p : e.paths)
     for (double x : standardised_steps(e, p, core, f, static_cast<std::size_t>(e.steps(lag))).value) {
@@ -226,53 +233,82 @@ HalfFits fit_halves(const Ensemble& e, double lag) {
   return {fit_half(e, lag, fold_of(e, 0)), fit_half(e, lag, fold_of(e, 1))};
 }
 
-Calibration::Holdout hold_out(const Ensemble& e, const Layer& core, const HalfFits& fits) {
-  Calibration::Holdout out;
-  const double window = e.window();
-  for (double lag : {0.1, 0.2, 0.5, 1.0}) {
-    const auto k = static_cast<std::size_t>(e.steps(lag));
-    if (lag > window * 0.9) break;
-    double observed = 0, predicted = 0, variance = 0;
-    std::vector<double> transform;
-    for (std::size_t half = 0; half < 2; ++half) {
-      const Fold seen = fold_of(e, half);
-      const Forecast f(fits[half], lag);
-      for (std::size_t p = 0; p < e.paths.size(); ++p) {
-        if (seen[p]) continue;
-        const auto& y = e.paths[p].y;
-        const Run& run = e.run_of(e.paths[p]);
-        double a = 0, b = 0;
-        for (std::size_t i = run.origin; i + k < y.size(); ++i) {
-          const double dt = run.time[i + k] - run.time[i];
-          if (std::abs(dt - lag) > 0.01 * lag)
-            continue;  // lags this long span irregular intervals: use true times
-          const double d = y[i + k] - y[i];
-          if ((i - run.origin) % k == 0) transform.push_back(f.cdf(y[i], y[i + k]));
-          if (!core.contains(y[i])) continue;
-          a += d * d;
-          b += f.square(y[i]);
-        }
-        observed += a;
-        predicted += b;
-        variance += (a - b) * (a - b);
+Prediction propagated(const HalfFits& halves) {
+  return [&halves](std::size_t half, const std::vector<double>& lags) {
+    std::vector<Eigen::MatrixXd> P;
+    for (const double lag : lags) P.push_back(Propagator(halves[half].law, halves[half].cells, lag).matrix());
+    return P;
+  };
+}
+
+namespace {
+
+/// Mean-squared displacement and histogram at one lag, over the cells that each half has not seen.
+void hold_out_lag(const Ensemble& e, const Layer& core, double lag, const std::array<Forecast, 2>& forecasts,
+                  Calibration::Holdout& out) {
+  const auto k = static_cast<std::size_t>(e.steps(lag));
+  double observed = 0, predicted = 0, variance = 0;
+  std::vector<double> transform;
+  for (std::size_t half = 0; half < 2; ++half) {
+    const Fold seen = fold_of(e, half);
+    const Forecast& f = forecasts[half];
+    for (std::size_t p = 0; p < e.paths.size(); ++p) {
+      if (seen[p]) continue;
+      const auto& y = e.paths[p].y;
+      const Run& run = e.run_of(e.paths[p]);
+      double a = 0, b = 0;
+      for (std::size_t i = run.origin; i + k < y.size(); ++i) {
+        const double dt = run.time[i + k] - run.time[i];
+        if (std::abs(dt - lag) > 0.01 * lag)
+          continue;  // lags this long span irregular intervals: use true times
+        const double d = y[i + k] - y[i];
+        if ((i - run.origin) % k == 0) transform.push_back(f.cdf(y[i], y[i + k]));
+        if (!core.contains(y[i])) continue;
+        a += d * d;
+        b += f.square(y[i]);
       }
+      observed += a;
+      predicted += b;
+      variance += (a - b) * (a - b);
     }
-    if (!(predicted > 0)) continue;
-    out.lag.push_back(lag);
-    out.msd_ratio.push_back(observed / predicted);
-    out.msd_sigma.push_back(std::sqrt(variance) / predicted);
-    out.histogram_p.push_back(uniform_p(transform, 10));
   }
+  if (!(predicted > 0)) return;
+  out.lag.push_back(lag);
+  out.msd_ratio.push_back(observed / predicted);
+  out.msd_sigma.push_back(std::sqrt(variance) / predicted);
+  out.histogram_p.push_back(uniform_p(transform, 10));
+}
+
+}  // namespace
+
+Calibration::Holdout hold_out(const Ensemble& e, const Layer& core, const Prediction& predict) {
+  std::vector<double> lags;
+  for (const double lag : {0.1, 0.2, 0.5, 1.0})
+    if (lag <= e.window() * 0.9) lags.push_back(lag);
+  const std::size_t short_lags = lags.size();
+  for (const Run& run : e.runs) {  // and the whole window of each run
+    const double whole = run.time.back() - run.time[run.origin];
+    if (std::find(lags.begin(), lags.end(), whole) == lags.end()) lags.push_back(whole);
+  }
+  std::array<std::vector<Forecast>, 2> forecasts;
+  for (std::size_t half = 0; half < 2; ++half)
+    for (auto& P : predict(half, lags)) forecasts[half].emplace_back(e.walls, std::move(P));
+
+  Calibration::Holdout out;
+  for (std::size_t l = 0; l < short_lags; ++l)
+    hold_out_lag(e, core, lags[l], {forecasts[0][l], forecasts[1][l]}, out);
   std::vector<double> ends;
   for (std::size_t half = 0; half < 2; ++half) {
     const Fold seen = fold_of(e, half);
     for (const Run& run : e.runs) {
-      const Forecast f(fits[half], run.time.back() - run.time[run.origin]);
+      const double whole = run.time.back() - run.time[run.origin];
+      const auto at = std::find(lags.begin(), lags.end(), whole) - lags.begin();
+      const Forecast& f = forecasts[half][static_cast<std::size_t>(at)];
       for (std::size_t p = run.first; p < run.last; ++p)
         if (!seen[p]) ends.push_back(f.cdf(e.paths[p].y[run.origin], e.paths[p].y.back()));
     }
   }
-  out.profile_lag = window;
+  out.profile_lag = e.window();
   out.profile_p = uniform_p(ends, 6);
   return out;
 }

@@ -3,6 +3,7 @@
 /// best?
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -15,12 +16,18 @@ namespace hemowalk::calibration {
 using HalfFits = std::array<LocalFit, 2>;
 HalfFits fit_halves(const Ensemble& ensemble, double lag);
 
+/// What becomes of cells by the law of one half: for each lag the matrix of Calibration's Walk.
+using Prediction =
+    std::function<std::vector<Eigen::MatrixXd>(std::size_t half, const std::vector<double>& lags)>;
+/// By the propagator of the fits themselves.
+Prediction propagated(const HalfFits& halves);
+
 /// Two folds of cells (odd and even within a run). The law fitted to one half walks the other half's cells
 /// from where they are: mean-squared displacement at each lag (all origins, error over cells), the
 /// displacements' probability integral transform under the predicted law (disjoint displacements, so it is
 /// uniform and independent if the law is right), and the profile at the end of the window from the positions
 /// at t0.
-Calibration::Holdout hold_out(const Ensemble& ensemble, const Layer& core, const HalfFits& halves);
+Calibration::Holdout hold_out(const Ensemble& ensemble, const Layer& core, const Prediction& predict);
 
 /// Step laws compared by the log-likelihood of unseen cells at one lag, nats per step relative to the
 /// Gaussian.

@@ -37,6 +37,15 @@ Json estimators(const std::vector<Estimate>& all) {
   return o;
 }
 
+Json holdout(const Calibration::Holdout& h) {
+  return {{"lag_s", numbers(h.lag)},
+          {"msd_ratio", numbers(h.msd_ratio)},
+          {"msd_sigma", numbers(h.msd_sigma)},
+          {"histogram_p", numbers(h.histogram_p)},
+          {"profile_lag_s", number(h.profile_lag)},
+          {"profile_p", number(h.profile_p)}};
+}
+
 Json curves(const std::vector<MsdCurve>& all) {
   Json a = Json::array();
   for (const auto& c : all)
@@ -125,12 +134,8 @@ std::string to_json(const Calibration& c) {
   j["msd"] = curves(c.msd);
   j["gate"] = gate(law.gate);
   j["verdict"] = verdicts(c.verdict);
-  j["holdout"] = {{"lag_s", numbers(c.holdout.lag)},
-                  {"msd_ratio", numbers(c.holdout.msd_ratio)},
-                  {"msd_sigma", numbers(c.holdout.msd_sigma)},
-                  {"histogram_p", numbers(c.holdout.histogram_p)},
-                  {"profile_lag_s", number(c.holdout.profile_lag)},
-                  {"profile_p", number(c.holdout.profile_p)}};
+  j["holdout"] = holdout(c.holdout);
+  if (!c.holdout_walk.lag.empty()) j["holdout_walk"] = holdout(c.holdout_walk);
   j["step_choices"] = step_choices(c.step_choices);
   j["residence"] = {{"zone_m", number(c.residence.zone)},
                     {"near_at_t0", c.residence.near_at_t0},

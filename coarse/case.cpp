@@ -58,7 +58,11 @@ yaml::Field build_format() {
       with_default("end", duration.above(0), "300 s", "physical time"),
       with_default("output", list_of(duration.at_least(0)), "[]",
                    "times of output, increasing; the end by default"),
-      with_default("initial", choice({"uniform"}), "uniform", "distribution at the start"),
+      with_default("initial",
+                   any_of({choice({"uniform"}),
+                           tagged({required("layer", list_of(quantity("m", "um").at_least(0), 2, 2),
+                                            "lower and upper height of the layer that is filled evenly")})}),
+                   "uniform", "where the walkers start"),
       with_default("seed", integer().at_least(0), "1", "of all random numbers"),
   });
 }
@@ -91,6 +95,13 @@ void check_case(const Value& v, Problems& problems) {
   if (v.has("domain.top") && v.has("domain.bottom") && periodic("domain.top") != periodic("domain.bottom"))
     problems.add(v["domain"].mark,
                  "domain: one face periodic, the other not (a period joins both) make both periodic");
+  if (const Value* low = v.find("initial.layer.0"), *high = v.find("initial.layer.1"),
+      *height = v.find("domain.height");
+      low && high && height && !(low->number() < high->number() && high->number() <= height->number()))
+    problems.add(low->mark, "initial.layer: " + format_number(low->number()) + " .. " +
+                                format_number(high->number()) +
+                                " m is no layer of the slab (0 <= lower < upper <= height = " +
+                                format_number(height->number()) + " m) correct it");
   if (const Value* name = v.find("name"); name && !is_file_stem(name->text()))
     problems.add(name->mark, "name: `" + name->text().substr(0, 60) +
                                  "` names a file (letters, digits, _, - and .) choose another");
@@ -126,7 +137,7 @@ Case case_of(const Value& v, const std::string& name) {
   c.end = v["end"].number();
   c.output = v["output"].numbers();
   if (c.output.empty()) c.output = {c.end};
-  c.initial = v["initial"].text();
+  if (v.has("initial.layer")) c.release = {v["initial.layer.0"].number(), v["initial.layer.1"].number()};
   c.seed = static_cast<std::uint64_t>(v["seed"].integer());
   return c;
 }

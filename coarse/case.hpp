@@ -1,6 +1,7 @@
 #pragma once
 /// \file Case: one coarse-grained transport problem (coarse.yaml), SI units.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -32,7 +33,8 @@ struct Case {
   double dt = 10e-3;           ///< s
   double end = 300;            ///< s
   std::vector<double> output;  ///< s, increasing, <= end
-  std::string initial = "uniform";
+  std::optional<std::array<double, 2>>
+      release;  ///< m, the layer over which the walkers are spread evenly at the start; none = the whole slab
   std::uint64_t seed = 1;
   std::string name = "coarse";        ///< file stem, names the output
   std::string source_text;            ///< canonical YAML of this case

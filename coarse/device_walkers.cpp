@@ -10,12 +10,12 @@ using One = Lanes<1>;
 
 /// Initial positions and velocities, as Walkers draws them.
 struct Scatter {
-  std::uint64_t seed;
+  WalkModel model;
   std::int32_t* y;
   float* memory;  ///< null: no velocities
   HEMO_HD void operator()(std::size_t i) const {
-    y[i] = static_cast<std::int32_t>(random_bits(seed, Stream::initial, i, 0).word[0] >> 2);
-    if (memory) memory[i] = normal4(random_bits(seed, Stream::initial, i, 1)).value[0];
+    y[i] = initial_position(model, i);
+    if (memory) memory[i] = normal4(random_bits(model.seed, Stream::initial, i, 1)).value[0];
   }
 };
 
@@ -77,7 +77,7 @@ DeviceWalkers::DeviceWalkers(Queue& queue, const WalkTables& walk, std::int64_t 
   model_.drift = walk.drifts ? drift_.data() : nullptr;
   if (model_.step_law == StepLaw::persistent)
     memory_ = Array<float>(static_cast<std::size_t>(count), queue.place());
-  queue_.for_each(y_.size(), Scatter{model_.seed, y_.data(), memory_.size() ? memory_.data() : nullptr});
+  queue_.for_each(y_.size(), Scatter{model_, y_.data(), memory_.size() ? memory_.data() : nullptr});
 }
 
 template <StepLaw S>

@@ -1,5 +1,6 @@
 #include "coarse/fokker_planck.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -43,6 +44,13 @@ FokkerPlanck::FokkerPlanck(const SlabLaw& law, const Face& bottom, const Face& t
   add_face(law, top, 1, cell_free_layer);
   for (auto* v : {&factor_lower_, &factor_middle_, &factor_upper_, &correction_, &stage_one_, &stage_two_})
     v->assign(n, 0);
+}
+
+void FokkerPlanck::release(double low, double high) {
+  for (int i = 0; i < cells(); ++i) {
+    const double overlap = std::min(high, (i + 1) * cell_) - std::max(low, i * cell_);
+    unknown_[i + 1] = std::max(0.0, overlap) / cell_ * height_ / (high - low);
+  }
 }
 
 void FokkerPlanck::add_interior(const SlabLaw& law) {

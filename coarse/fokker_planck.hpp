@@ -20,13 +20,16 @@ class FokkerPlanck {
   FokkerPlanck(const SlabLaw& law, const Face& bottom, const Face& top, int cells,
                double cell_free_layer = 0);
 
+  /// Gathers all walkers in the layer [low, high], m, evenly; the mean over the slab stays 1.
+  void release(double low, double high);
+
   /// Integrates over \p duration, s, in \p steps equal steps. Cost: about 20 ns per cell and step.
   void advance(double duration, int steps);
 
   /// Fraction of all walkers that the faces took for good, and that traps hold (bottom, top).
   double absorbed() const { return taken(false); }
   double trapped() const { return taken(true); }
-  /// [cells] concentration relative to the initial one.
+  /// [cells] concentration relative to walkers spread over the whole slab.
   std::vector<double> concentration() const { return {unknown_.begin() + 1, unknown_.end() - 1}; }
   /// Mean over equal bins; \p bins divides the number of cells.
   std::vector<double> profile(int bins) const;

@@ -100,6 +100,7 @@ template <class Visit>
 void solve_equation(const Case& c, const SlabLaw& law, double layer, int cells,
                     const std::vector<std::int64_t>& steps, int steps_per_output, const Visit& visit) {
   FokkerPlanck solver(law, c.bottom, c.top, cells, layer);
+  if (c.release) solver.release((*c.release)[0], (*c.release)[1]);
   std::int64_t before = 0;
   for (std::size_t k = 0; k < steps.size(); ++k) {
     solver.advance(static_cast<double>(steps[k] - before) * c.dt, steps_per_output);
@@ -172,8 +173,6 @@ void walk(const Case& c, const SlabLaw& law, const WalkSettings& settings,
 
 Result run(const Case& c, const data::TransportLaw& given, const RunOptions& options) {
   const auto start = Clock::now();
-  require(c.initial.empty() || c.initial == "uniform",
-          "initial: `" + c.initial + "` is not known (walkers start uniformly) use uniform");
   const auto keeps = [](const Face& f) {
     return f.type == Face::Type::reflect || f.type == Face::Type::periodic;
   };

@@ -22,7 +22,7 @@ struct Result {
   std::vector<double> trapped_fraction;  ///< [T] held by traps at that time
   struct Profile {
     std::vector<double> y;  ///< [Y] m, bin centres
-    std::vector<double> c;  ///< [T*Y] concentration relative to the initial uniform one
+    std::vector<double> c;  ///< [T*Y] concentration relative to all walkers spread over the slab
   } profile;
   struct Flow {                              ///< empty unless asked for
     std::vector<double> mean_z, variance_z;  ///< [T] m, m2: way along the flow of all walkers

@@ -54,6 +54,7 @@ struct WalkModel {
   bool periodic = false;
   WallScheme scheme = WallScheme::exact;
   std::uint64_t seed = 1;
+  std::int64_t release_low = 0, release_span = top_position;  ///< where walkers start, evenly spread
 
   StepLaw step_law = StepLaw::gaussian;
   struct {  ///< displacement / sqrt(2 D dt) = keep_in x + first n1 + second n2; x' = keep x + fresh n1
@@ -64,6 +65,12 @@ struct WalkModel {
   } heavy_tail;
   float gradient_drift = 0.5f;  ///< share of d(2 D dt)/dy in the drift: 1/2 is D'; less for a persistent walk
 };
+
+/// Where walker \p id starts.
+HEMO_HD inline std::int32_t initial_position(const WalkModel& m, std::uint64_t id) {
+  const std::int64_t drawn = random_bits(m.seed, Stream::initial, id, 0).word[0] >> 2;
+  return static_cast<std::int32_t>(m.release_low + (drawn * m.release_span >> 30));
+}
 
 /// The walkers of one set of lanes.
 template <class L>

@@ -61,6 +61,10 @@ void check_case(const Case& c, const SlabLaw& law) {
           "height, dt and walkers must be positive (the slab or the ensemble is empty) correct the case");
   require((c.bottom.type == Face::Type::periodic) == (c.top.type == Face::Type::periodic),
           "one face is periodic and the other is not (a period joins both) make both periodic");
+  require(
+      !c.release ||
+          (0 <= (*c.release)[0] && (*c.release)[0] < (*c.release)[1] && (*c.release)[1] <= c.height),
+      "the walkers' layer at the start does not lie in the slab (0 <= lower < upper <= height) correct it");
   const double rms = std::sqrt(2 * law.largest_D() * c.dt);
   require(rms <= c.height / 8, [&] {
     return formatted("dt = %g s is too long for the slab (rms step %g um, height %g um) use dt <= %g s", c.dt,
@@ -92,6 +96,10 @@ WalkTables make_walk(const Case& c, const SlabLaw& law, const WalkSettings& sett
   m.periodic = c.bottom.type == Face::Type::periodic;
   m.scheme = settings.scheme;
   m.seed = c.seed;
+  if (c.release) {
+    m.release_low = std::llround((*c.release)[0] / unit);
+    m.release_span = std::llround((*c.release)[1] / unit) - m.release_low;
+  }
   m.step_law = settings.step_law;
   if (settings.step_law == StepLaw::persistent) {
     require(settings.memory > 0,

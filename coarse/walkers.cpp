@@ -39,8 +39,7 @@ Walkers::Walkers(const Case& c, const SlabLaw& law, const WalkSettings& settings
   active_.back() = static_cast<std::int32_t>(size_ - (n_blocks - 1) * block);
 #pragma omp parallel for schedule(static)
   for (std::int64_t i = 0; i < n_blocks * block; ++i) {
-    const RandomBits b = random_bits(c.seed, Stream::initial, i, 0);
-    y_[i] = i < size_ ? static_cast<std::int32_t>(b.word[0] >> 2) : state::nobody;
+    y_[i] = i < size_ ? initial_position(model_, static_cast<std::uint64_t>(i)) : state::nobody;
     offset_[i] = static_cast<std::uint16_t>(i % block);
     if (memory_.size()) memory_[i] = normal4(random_bits(c.seed, Stream::initial, i, 1)).value[0];
   }

@@ -1,5 +1,6 @@
 # The program as a user meets it. Runs of the program get one thread: these tests are about behaviour, not speed.
 if(TARGET hemowalk)
+  hemowalk_test(test_holdout_walk SOURCES integration/test_holdout_walk.cpp LINK hemowalk_workflow LABELS integration)
   hemowalk_test(test_cli_json SOURCES integration/test_cli_json.cpp LINK hemowalk_workflow LABELS integration)
   hemowalk_test(test_report SOURCES integration/test_report.cpp LINK hemowalk_workflow LABELS integration)
   hemowalk_test(test_cli_calibrate SOURCES integration/test_cli_calibrate.cpp LINK hemowalk_workflow LABELS integration)

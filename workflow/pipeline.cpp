@@ -15,6 +15,7 @@
 #include "core/log.hpp"
 #include "core/progress.hpp"
 #include "core/provenance.hpp"
+#include "workflow/coarse_walk.hpp"
 #include "workflow/command.hpp"
 #include "workflow/local_launcher.hpp"
 #include "workflow/plan.hpp"
@@ -226,6 +227,7 @@ class Pipeline {
     for (const auto& [kind, tracks] : runs.front().kinds) {
       calibration::Options options = campaign_.calibrate;
       options.kind = kind;
+      options.walk = coarse_walk();
       try {
         auto result = calibration::calibrate(runs, options);
         if (kind == first) {

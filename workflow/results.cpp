@@ -72,7 +72,7 @@ Json exact_json(const coarse::Case& the_case, const data::TransportLaw& law) {
   const auto plain = [](const coarse::Face& f) { return f.type == Type::absorb || f.type == Type::reflect; };
   const int faces = absorbs(the_case.bottom) + absorbs(the_case.top);
   const double D = the_case.constant_D.value_or(law.core.D);
-  if (!faces || !plain(the_case.bottom) || !plain(the_case.top) || the_case.initial != "uniform" || !(D > 0))
+  if (!faces || !plain(the_case.bottom) || !plain(the_case.top) || the_case.release || !(D > 0))
     return nullptr;
   Json exact;
   exact["D_m2_per_s"] = D;

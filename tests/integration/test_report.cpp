@@ -68,7 +68,7 @@ TEST(Report, DrawsAllChartsInABrowser) {
   EXPECT_NE(check.find("data-verdict=\"all charts drawn\""), std::string::npos) << check;
   EXPECT_NE(check.find("data-errors=\"\""), std::string::npos) << check;
   // 4 MSD, record, kurtosis, D(y), v(y), density, absorbed fraction, concentration
-  EXPECT_EQ(charts_in(check), 11) << check;
+  EXPECT_EQ(charts_in(check), 12) << check;
 }
 
 TEST(Report, SelfCheckSeesABrokenPage) {

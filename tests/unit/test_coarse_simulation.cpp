@@ -51,6 +51,33 @@ TEST(CoarseRun, GivesTheSeriesWithItsSamplingError) {
   EXPECT_GT(r.walker_steps_per_s, 0);
 }
 
+/// Walkers let go in a layer spread as the equation says: every bin of the profile within its own counting
+/// error (Bonferroni over bins and times), and the first output is the layer itself.
+TEST(CoarseRun, ReleasesWalkersInALayer) {
+  Case c = impact_r(1e-10);
+  c.height = 50e-6, c.dt = 0.05, c.end = 5, c.output = {0, 0.5, 5};
+  c.walkers = 200'000;
+  c.release = {10e-6, 12.5e-6};
+  RunOptions o;
+  o.bins = 20;
+  const Result walked = run(c, data::TransportLaw::constant(1e-10), o);
+  o.fokker_planck = true;
+  const Result solved = run(c, data::TransportLaw::constant(1e-10), o);
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_DOUBLE_EQ(walked.profile.c[i], i == 4 ? 20 : 0);
+    EXPECT_NEAR(solved.profile.c[i], i == 4 ? 20 : 0, 1e-9);
+  }
+  const double bound = normal_quantile(1 - alpha / 80);
+  for (std::size_t k = 20; k < 60; ++k) {
+    const double p = solved.profile.c[k] / 20;  // share of the walkers in the bin
+    EXPECT_LT(std::abs(walked.profile.c[k] / 20 - p), bound * std::sqrt(p * (1 - p) / 2e5) + 1e-4) << k;
+  }
+  for (const auto& layer : {std::array{5e-6, 5e-6}, std::array{-1e-6, 5e-6}, std::array{40e-6, 51e-6}}) {
+    c.release = layer;
+    EXPECT_THROW(run(c, data::TransportLaw::constant(1e-10)), InputError);
+  }
+}
+
 TEST(CoarseRun, CarriesTheLawsUncertaintyToTheResult) {
   Case c = impact_r(0);
   c.constant_D.reset();

@@ -152,6 +152,11 @@ function msdCharts() {
   if (kurtosis.length) lineChart(grid, {title: "Are the steps Gaussian?", note: "Excess kurtosis of displacements: 0 is Gaussian; heavy tails that fade with the lag do not survive coarse-graining.",
     x: {label: "lag (ms)", scale: ms, log: true}, y: {label: "excess kurtosis"}, hlines: [{at: 0, label: "Gaussian"}], failed: anyFailed(),
     series: kurtosis.map(([p, i, c]) => ({name: many ? p.label : "measured", x: c.kurtosis.lag_s, y: c.kurtosis.excess, points: true, color: palette(i)}))});
+  const heldOut = points.map((p, i) => [p, i, (calibrationOf(p) || {}).holdout_walk]).filter(([, , h]) => h && (h.lag_s || []).length);
+  if (heldOut.length) lineChart(grid, {title: "Does the coarse walk predict cells it has not seen?", note: "The law from half of the cells walks the other half: mean square displacement observed over predicted. p of the displacements' histogram: "
+      + heldOut.map(([p, , h]) => (many ? p.label + " " : "") + h.histogram_p.filter(isNumber).map(v => v.toPrecision(2)).join(", ")).join("; ") + ".",
+    x: {label: "lag (ms)", scale: ms, log: true}, y: {label: "observed / predicted", range: () => { const reach = Math.max(0.1, ...heldOut.flatMap(([, , h]) => h.msd_ratio.map((r, k) => Math.abs(r - 1) + h.msd_sigma[k]))); return [1 - 1.1 * reach, 1 + 1.1 * reach]; }}, hlines: [{at: 1, label: "as predicted"}], failed: anyFailed(),
+    series: heldOut.map(([p, i, h]) => ({name: many ? p.label : "unseen half", x: h.lag_s, y: h.msd_ratio, sigma: h.msd_sigma, points: true, color: palette(i)}))});
 }
 
 function literature() {
@@ -246,8 +251,8 @@ function coarse() {
     const {y_m: y, c} = one.profile || {};
     if (y && c && c.length) {
       const rows = c;
-      if (one.time_s.length >= 12) heatMap(grid, {title: "Concentration", note: "Relative to the initial uniform one" + (group.length > 1 ? "; " + one.point : "") + ".", time: one.time_s, y, c: rows, xlabel: "time (s)", ylabel: "y (mm)", yscale: 1e3});
-      else lineChart(grid, {title: "Concentration profiles", note: "Relative to the initial uniform one" + (group.length > 1 ? "; " + one.point : "") + ".", x: {label: "y (mm)", scale: 1e3}, y: {label: "c / c₀", range: (lo, hi) => [0, hi * 1.08]},
+      if (one.time_s.length >= 12) heatMap(grid, {title: "Concentration", note: "Relative to all walkers spread over the slab" + (group.length > 1 ? "; " + one.point : "") + ".", time: one.time_s, y, c: rows, xlabel: "time (s)", ylabel: "y (mm)", yscale: 1e3});
+      else lineChart(grid, {title: "Concentration profiles", note: "Relative to all walkers spread over the slab" + (group.length > 1 ? "; " + one.point : "") + ".", x: {label: "y (mm)", scale: 1e3}, y: {label: "c / c₀", range: (lo, hi) => [0, hi * 1.08]},
         series: one.time_s.map((t, k) => ({name: `t = ${scientific(t)} s`, x: y, y: rows[k], color: palette(k)}))});
     }
     s.append(el("p", {class: "note", style: "color:var(--soft);font-size:13px"}, group.map(c => `${c.method === "walk" ? "Random walk" : "Fokker-Planck"}: ${c.reason}`)[0] || ""));

@@ -13,6 +13,7 @@
 #include "core/io.hpp"
 #include "core/log.hpp"
 #include "core/units.hpp"
+#include "workflow/coarse_walk.hpp"
 #include "workflow/command.hpp"
 #include "workflow/report.hpp"
 #include "workflow/studies.hpp"
@@ -112,6 +113,15 @@ void print_result(const calibration::Calibration& c) {
         "{:.2g} +- {:.1g} s\n",
         r.zone * 1e6, r.near_at_t0, r.left_of_t0, r.mean_time, r.mean_time_sigma, r.mean_time_out,
         r.mean_time_out_sigma);
+  for (const auto& [h, who] :
+       {std::pair{&c.holdout, "the fitted law"}, std::pair{&c.holdout_walk, "the coarse walk"}}) {
+    if (h->lag.empty()) continue;
+    fmt::print("half of the cells, predicted by {} from the others:", who);
+    for (std::size_t k = 0; k < h->lag.size(); ++k)
+      fmt::print(" MSD({:.3g} ms) observed/predicted {:.2f} +- {:.2f}, histogram p = {:.2g};",
+                 h->lag[k] * 1e3, h->msd_ratio[k], h->msd_sigma[k], h->histogram_p[k]);
+    fmt::print(" profile after {:.3g} s p = {:.2g}\n", h->profile_lag, h->profile_p);
+  }
   print_chart(c);
   if (!c.verdict.empty()) fmt::print("\n");
   for (const auto& v : c.verdict) fmt::print("{}\n", v.statement);
@@ -126,6 +136,7 @@ calibration::Options options_of(const Flags& flags, const CalibrateFlags& own) {
   if (!own.lag.empty()) options.lag = parse_quantity(own.lag, "s", "ms");
   options.bootstrap = own.bootstrap;
   options.seed = flags.seed.value_or(1);
+  options.walk = coarse_walk();
   return options;
 }
 
