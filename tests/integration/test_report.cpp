@@ -67,7 +67,7 @@ TEST(Report, DrawsAllChartsInABrowser) {
   if (check.empty()) GTEST_SKIP() << "no chromium on this machine";
   EXPECT_NE(check.find("data-verdict=\"all charts drawn\""), std::string::npos) << check;
   EXPECT_NE(check.find("data-errors=\"\""), std::string::npos) << check;
-  // 4 MSD, record, kurtosis, D(y), v(y), density, absorbed fraction, concentration
+  // 4 MSD, record, kurtosis, unseen cells, D(y), v(y), density, absorbed fraction, concentration
   EXPECT_EQ(charts_in(check), 12) << check;
 }
 
