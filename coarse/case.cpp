@@ -60,6 +60,8 @@ yaml::Field build_format() {
                    "times of output, increasing; the end by default"),
       with_default("initial", choice({"uniform"}), "uniform", "distribution at the start"),
       with_default("seed", integer().at_least(0), "1", "of all random numbers"),
+      with_default("place", choice({"host", "device"}), "host",
+                   "where the walkers are: device = an NVIDIA GPU"),
   });
 }
 
@@ -128,6 +130,7 @@ Case case_of(const Value& v, const std::string& name) {
   if (c.output.empty()) c.output = {c.end};
   c.initial = v["initial"].text();
   c.seed = static_cast<std::uint64_t>(v["seed"].integer());
+  c.place = v["place"].choice<Place>();
   return c;
 }
 

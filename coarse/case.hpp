@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/portability.hpp"
+
 namespace hemowalk::yaml {
 struct Field;
 struct Node;
@@ -34,6 +36,7 @@ struct Case {
   std::vector<double> output;  ///< s, increasing, <= end
   std::string initial = "uniform";
   std::uint64_t seed = 1;
+  Place place = Place::host;          ///< of the walkers
   std::string name = "coarse";        ///< file stem, names the output
   std::string source_text;            ///< canonical YAML of this case
   std::string input_sha256;           ///< of what decides the results; a law file counts by its content

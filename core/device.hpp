@@ -150,6 +150,10 @@ __global__ void __launch_bounds__(Body::threads) block_kernel(Body body) {
 
 }  // namespace detail
 
+inline constexpr const char* no_device =
+    "place: device asked for (no GPU is visible, or this program was built without CUDA) configure with "
+    "-D HEMOWALK_CUDA=ON on a machine with a GPU, or use place: host";
+
 /// Is there a GPU this process may use?
 inline bool device_present() {
 #if defined(HEMOWALK_CUDA)
@@ -206,9 +210,7 @@ class Queue {
   /// \throws InputError when a device is asked for and there is none.
   explicit Queue(Place place) : place_(place) {
     if (place == Place::host) return;
-    require(device_present(),
-            "place: device asked for (no GPU is visible, or this binary was built without CUDA) build the "
-            "cuda preset on a machine with a GPU, or use place: host");
+    require(device_present(), no_device);
 #if defined(HEMOWALK_CUDA)
     detail::check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "creating a stream");
 #endif
