@@ -19,6 +19,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -164,6 +165,14 @@ inline bool device_present() {
 #endif
 }
 
+/// Which of \p count devices this process takes: the ranks of a machine take turns. Their numbers on the
+/// machine are the launcher's: Open MPI's, or Slurm's.
+inline int device_of_process(int count) {
+  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_RANK", "SLURM_LOCALID"})
+    if (const char* value = std::getenv(name)) return std::atoi(value) % count;
+  return 0;
+}
+
 /// Memory of the host that a device's copies may read and write while the host goes on, for as long as this
 /// lives.
 class Pinned {
@@ -212,6 +221,9 @@ class Queue {
     if (place == Place::host) return;
     require(device_present(), no_device);
 #if defined(HEMOWALK_CUDA)
+    int count = 1;
+    detail::check(cudaGetDeviceCount(&count), "counting devices");
+    detail::check(cudaSetDevice(device_of_process(count)), "choosing a device");
     detail::check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "creating a stream");
 #endif
   }
