@@ -64,6 +64,8 @@ yaml::Field build_format() {
                                             "lower and upper height of the layer that is filled evenly")})}),
                    "uniform", "where the walkers start"),
       with_default("seed", integer().at_least(0), "1", "of all random numbers"),
+      with_default("place", choice({"host", "device"}), "host",
+                   "where the walkers are: device = an NVIDIA GPU"),
   });
 }
 
@@ -139,6 +141,7 @@ Case case_of(const Value& v, const std::string& name) {
   if (c.output.empty()) c.output = {c.end};
   if (v.has("initial.layer")) c.release = {v["initial.layer.0"].number(), v["initial.layer.1"].number()};
   c.seed = static_cast<std::uint64_t>(v["seed"].integer());
+  c.place = v["place"].choice<Place>();
   return c;
 }
 

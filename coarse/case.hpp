@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/portability.hpp"
+
 namespace hemowalk::yaml {
 struct Field;
 struct Node;
@@ -36,6 +38,7 @@ struct Case {
   std::optional<std::array<double, 2>>
       release;  ///< m, the layer over which the walkers are spread evenly at the start; none = the whole slab
   std::uint64_t seed = 1;
+  Place place = Place::host;          ///< of the walkers
   std::string name = "coarse";        ///< file stem, names the output
   std::string source_text;            ///< canonical YAML of this case
   std::string input_sha256;           ///< of what decides the results; a law file counts by its content

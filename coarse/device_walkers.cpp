@@ -1,6 +1,6 @@
 #include "coarse/device_walkers.hpp"
 
-#include <algorithm>
+#include <numeric>
 
 namespace hemowalk::coarse {
 
@@ -23,6 +23,8 @@ struct Ignore {
   HEMO_HD void operator()(int, std::int32_t) const {}
 };
 
+constexpr std::size_t counters = 1024;  ///< of steps: so many that few threads meet at one
+
 /// Steps [begin, end) of one walker, in registers.
 template <StepLaw S, bool Table, bool Drift>
 struct Walk {
@@ -30,10 +32,12 @@ struct Walk {
   std::int64_t begin, end;
   std::int32_t* y;
   float* memory;
+  std::int64_t* walked;  ///< [counters]
 
   HEMO_HD void operator()(std::size_t i) const {
     const std::int32_t stored = y[i];
     if (state::is_absorbed(stored)) return;
+    atomic_add(walked + i % counters, end - begin);
     LaneState<One> w[1];
     w[0].code = stored >= 0 ? 0 : stored;
     w[0].y = stored >= 0 ? stored : top_position / 2;
@@ -72,7 +76,8 @@ DeviceWalkers::DeviceWalkers(Queue& queue, const WalkTables& walk, std::int64_t 
       model_(walk.model),
       variance_(make_array(queue.place(), walk.variance)),
       drift_(make_array(queue.place(), walk.drift)),
-      y_(static_cast<std::size_t>(count), queue.place()) {
+      y_(static_cast<std::size_t>(count), queue.place()),
+      walked_(counters, queue.place()) {
   model_.variance = variance_.data();
   model_.drift = walk.drifts ? drift_.data() : nullptr;
   if (model_.step_law == StepLaw::persistent)
@@ -80,42 +85,27 @@ DeviceWalkers::DeviceWalkers(Queue& queue, const WalkTables& walk, std::int64_t 
   queue_.for_each(y_.size(), Scatter{model_, y_.data(), memory_.size() ? memory_.data() : nullptr});
 }
 
-template <StepLaw S>
-void DeviceWalkers::walk_leg(std::int64_t begin, std::int64_t end) {
-  if (!table_)
-    queue_.for_each(y_.size(), Walk<S, false, false>{model_, begin, end, y_.data(), memory_.data()});
-  else if (!model_.drift)
-    queue_.for_each(y_.size(), Walk<S, true, false>{model_, begin, end, y_.data(), memory_.data()});
-  else
-    queue_.for_each(y_.size(), Walk<S, true, true>{model_, begin, end, y_.data(), memory_.data()});
-}
-
 void DeviceWalkers::advance_to(std::int64_t step) {
-  constexpr std::int64_t leg = 512;  // absorbed walkers leave their warp between legs
-  while (step_ < step) {
-    const std::int64_t end = std::min(step_ + leg, step);
-    switch (model_.step_law) {
-      case StepLaw::gaussian:
-        walk_leg<StepLaw::gaussian>(step_, end);
-        break;
-      case StepLaw::persistent:
-        walk_leg<StepLaw::persistent>(step_, end);
-        break;
-      case StepLaw::heavy_tail:
-        walk_leg<StepLaw::heavy_tail>(step_, end);
-        break;
-    }
-    step_ = end;
-  }
+  walk_legs(model_, table_, step_, step, [&](auto kind, std::int64_t begin, std::int64_t end) {
+    queue_.for_each(y_.size(), Walk<kind.step_law, kind.table, kind.drift>{model_, begin, end, y_.data(),
+                                                                           memory_.data(), walked_.data()});
+  });
 }
 
-DeviceWalkers::Counts DeviceWalkers::count(int bins) const {
+std::int64_t DeviceWalkers::steps_walked() const {
+  std::vector<std::int64_t> values(counters);
+  queue_.copy(values.data(), walked_.data(), counters);
+  queue_.wait();
+  return std::accumulate(values.begin(), values.end(), std::int64_t{0});
+}
+
+WalkCounts DeviceWalkers::count(int bins) const {
   Array<std::int64_t> placed(static_cast<std::size_t>(bins) + 4, queue_.place());
   queue_.for_each(y_.size(), Count{y_.data(), bins, placed.data()});
   std::vector<std::int64_t> values(placed.size());
   queue_.copy(values.data(), placed.data(), values.size());
   queue_.wait();
-  Counts counts;
+  WalkCounts counts;
   for (std::size_t side = 0; side < 2; ++side)
     counts.absorbed[side] = values[side], counts.trapped[side] = values[2 + side];
   counts.histogram.assign(values.begin() + 4, values.end());

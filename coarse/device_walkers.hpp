@@ -3,7 +3,6 @@
 /// random numbers. Walkers is the definition of right; positions may differ from it by roundings, counts by
 /// walkers that these move across a face or a bin.
 
-#include <array>
 #include <cstdint>
 
 #include "coarse/walk_model.hpp"
@@ -22,25 +21,21 @@ class DeviceWalkers {
   void advance_to(std::int64_t step);
   std::int64_t step() const { return step_; }
   std::int64_t size() const { return size_; }
+  /// Steps actually walked, as Walkers counts them; waits.
+  std::int64_t steps_walked() const;
 
-  struct Counts {
-    std::array<std::int64_t, 2> absorbed{}, trapped{};  ///< bottom, top
-    std::vector<std::int64_t> histogram;                ///< free walkers per bin of equal height
-  };
-  Counts count(int bins) const;
+  WalkCounts count(int bins) const;
   /// Positions (2^30 = the slab's height; below zero: state::), by number; waits.
   std::vector<std::int32_t> positions() const;
 
  private:
-  template <StepLaw S>
-  void walk_leg(std::int64_t begin, std::int64_t end);
-
   Queue& queue_;
   std::int64_t size_, step_ = 0;
   bool table_;
   WalkModel model_;
   Array<float> variance_, drift_, memory_;
   Array<std::int32_t> y_;
+  Array<std::int64_t> walked_;  ///< steps, added up by groups of walkers
 };
 
 }  // namespace hemowalk::coarse

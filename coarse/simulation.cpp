@@ -8,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "coarse/device_walkers.hpp"
 #include "coarse/fokker_planck.hpp"
 #include "coarse/slab_law.hpp"
 #include "coarse/walkers.hpp"
@@ -138,15 +139,18 @@ double binomial_sigma(std::int64_t hits, std::int64_t n) {
   return std::sqrt((k + 0.5) * (N - k + 0.5) / (N + 1)) / (N + 1);
 }
 
-void walk(const Case& c, const SlabLaw& law, const WalkSettings& settings,
-          const std::vector<std::int64_t>& steps, const RunOptions& options, Result& result) {
-  Walkers walkers(c, law, settings);
+/// \tparam Ensemble Walkers or DeviceWalkers.
+template <class Ensemble>
+void walk(Ensemble&& walkers, const Case& c, const std::vector<std::int64_t>& steps,
+          const RunOptions& options, Result& result) {
   double walking = 0;
+  std::int64_t walked = 0;
   const std::int64_t stride = std::max<std::int64_t>(steps.back() / 100, 512);
   for (const std::int64_t step : steps) {
     const auto leg_start = Clock::now();
     while (walkers.step() < step) {
       walkers.advance_to(std::min(walkers.step() + stride, step));
+      walked = walkers.steps_walked();
       if (options.progress)
         options.progress(static_cast<double>(walkers.step()) / static_cast<double>(steps.back()));
     }
@@ -159,17 +163,23 @@ void walk(const Case& c, const SlabLaw& law, const WalkSettings& settings,
     result.trapped_fraction.push_back(static_cast<double>(counts.trapped[0] + counts.trapped[1]) / n);
     for (const std::int64_t in_bin : counts.histogram)
       result.profile.c.push_back(static_cast<double>(in_bin) * options.bins / n);
-    if (options.track_flow_direction) {
-      const auto spread = walkers.spread();
-      result.flow.mean_z.push_back(spread.mean);
-      result.flow.variance_z.push_back(spread.variance);
-    }
+    if constexpr (requires { walkers.spread(); })
+      if (options.track_flow_direction) {
+        const auto spread = walkers.spread();
+        result.flow.mean_z.push_back(spread.mean);
+        result.flow.variance_z.push_back(spread.variance);
+      }
   }
   result.walkers = c.walkers;
-  result.walker_steps_per_s = walking > 0 ? static_cast<double>(walkers.steps_walked()) / walking : 0;
+  result.walker_steps_per_s = walking > 0 ? static_cast<double>(walked) / walking : 0;
 }
 
 }  // namespace
+
+std::string place_problem(const Case& c) {
+  if (c.place == Place::host || device_present()) return {};
+  return c.name + ": " + no_device;
+}
 
 Result run(const Case& c, const data::TransportLaw& given, const RunOptions& options) {
   const auto start = Clock::now();
@@ -180,6 +190,9 @@ Result run(const Case& c, const data::TransportLaw& given, const RunOptions& opt
       !options.track_flow_direction || (keeps(c.bottom) && keeps(c.top)),
       "the way along the flow was asked for beside a face that takes walkers (its mean would mix those still "
       "walking with those that stopped) use reflecting or periodic faces");
+  require(!options.track_flow_direction || c.place == Place::host,
+          "the way along the flow was asked for of walkers on the device (they do not keep it) use place: "
+          "host");
   data::TransportLaw law = given;
   if (c.constant_D) {
     law = data::TransportLaw::constant(*c.constant_D);
@@ -204,6 +217,9 @@ Result run(const Case& c, const data::TransportLaw& given, const RunOptions& opt
   if (options.fokker_planck) {
     result.method = "fokker_planck";
     result.reason = "Fokker-Planck equation of the Gaussian walk (asked for; no sampling noise)";
+    if (c.place == Place::device)
+      result.warnings.push_back(
+          "place: device has no effect (the equation is solved on the host) walk, or drop it");
     solve_equation(c, slab, layer_of(law), grid_cells(slab, options.bins, 1024), steps, 400,
                    [&](std::size_t, const FokkerPlanck& s) {
                      result.absorbed_fraction.push_back(s.absorbed());
@@ -213,7 +229,13 @@ Result run(const Case& c, const data::TransportLaw& given, const RunOptions& opt
                      result.profile.c.insert(result.profile.c.end(), p.begin(), p.end());
                    });
   } else {
-    walk(c, slab, settings, steps, options, result);
+    if (c.place == Place::host) {
+      walk(Walkers(c, slab, settings), c, steps, options, result);
+    } else {
+      Queue queue(options.device);
+      result.reason += ", on the device";
+      walk(DeviceWalkers(queue, make_walk(c, slab, settings), c.walkers), c, steps, options, result);
+    }
   }
   result.absorbed_law_sigma = law_sigma(c, law, steps, options.law_draws);
   result.wall = seconds_since(start);

@@ -39,10 +39,14 @@ struct RunOptions {
   bool fokker_planck = false;            ///< solve the equation instead of walking
   int bins = 64;                         ///< of the concentration profile
   bool track_flow_direction = false;     ///< fills Result::flow; needs faces that keep every walker
+  Place device = Place::device;  ///< where place: device runs; host: its kernels thread by thread, for tests
 };
 
-/// Runs the case. Results depend on the seed only, not on threads, ranks or output times. Output times are
-/// rounded to whole steps (with a warning). \throws InputError for a case that cannot run, Refused (strict).
+/// Why the case cannot be walked on this machine, or nothing.
+std::string place_problem(const Case& the_case);
+/// Runs the case. Results depend on the seed only, not on threads, ranks or output times; of place they
+/// depend to round-off. Output times are rounded to whole steps (with a warning). \throws InputError for a
+/// case that cannot run, Refused (strict).
 Result run(const Case& the_case, const data::TransportLaw& law, const RunOptions& options = {});
 
 /// The coarse --json object of docs/reference.md.

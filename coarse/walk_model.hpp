@@ -1,6 +1,8 @@
 #pragma once
 /// \file From a case and its law to the numbers a walk runs on, for host and device.
 
+#include <algorithm>
+#include <array>
 #include <vector>
 
 #include "coarse/slab_law.hpp"
@@ -31,5 +33,47 @@ struct WalkTables {
 /// \throws InputError when dt is too long for the slab (rms step > height/8), a trap has no layer, or the
 /// step law is unusable.
 WalkTables make_walk(const Case& the_case, const SlabLaw& law, const WalkSettings& settings);
+
+/// Where the walkers are.
+struct WalkCounts {
+  std::array<std::int64_t, 2> absorbed{}, trapped{};  ///< bottom, top
+  std::vector<std::int64_t> histogram;                ///< free walkers per bin of equal height
+};
+
+/// What a step is compiled for: does the law depend on y, and is there a drift?
+template <StepLaw S, bool Table, bool Drift>
+struct WalkKind {
+  static constexpr StepLaw step_law = S;
+  static constexpr bool table = Table, drift = Drift;
+};
+
+/// From \p step on to \p end in legs of 512 steps, between which absorbed walkers leave:
+/// leg(WalkKind, first step, last step).
+template <class Leg>
+void walk_legs(const WalkModel& model, bool table, std::int64_t& step, std::int64_t end, const Leg& leg) {
+  while (step < end) {
+    const std::int64_t first = step, last = std::min<std::int64_t>(step + 512, end);
+    const auto with = [&]<StepLaw S>() {
+      if (!table)
+        leg(WalkKind<S, false, false>{}, first, last);
+      else if (!model.drift)
+        leg(WalkKind<S, true, false>{}, first, last);
+      else
+        leg(WalkKind<S, true, true>{}, first, last);
+    };
+    switch (model.step_law) {
+      case StepLaw::gaussian:
+        with.template operator()<StepLaw::gaussian>();
+        break;
+      case StepLaw::persistent:
+        with.template operator()<StepLaw::persistent>();
+        break;
+      case StepLaw::heavy_tail:
+        with.template operator()<StepLaw::heavy_tail>();
+        break;
+    }
+    step = last;
+  }
+}
 
 }  // namespace hemowalk::coarse

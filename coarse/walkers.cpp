@@ -97,48 +97,26 @@ void Walkers::compact(std::int64_t b) {
   for (std::int64_t i = b * block + kept; i % (width * sets) != 0; ++i) y_[i] = state::nobody;
 }
 
-template <StepLaw S>
-void Walkers::walk_leg(std::int64_t begin, std::int64_t end) {
-  const bool takes = model_.bottom.active() || model_.top.active();
-  std::int64_t walked = 0;
-#pragma omp parallel for schedule(dynamic, 1) reduction(+ : walked) if (blocks() > 1)
-  for (std::int64_t b = 0; b < blocks(); ++b) {
-    walked += active_[b] * (end - begin);
-    if (!table_)
-      walk_block<S, false, false>(b, begin, end);
-    else if (!model_.drift)
-      walk_block<S, true, false>(b, begin, end);
-    else
-      walk_block<S, true, true>(b, begin, end);
-    if (takes && way_.size() == 0) compact(b);
-  }
-  steps_walked_ += walked;
-}
-
 void Walkers::advance_to(std::int64_t step) {
-  while (step_ < step) {
-    const std::int64_t end = std::min(step_ + leg, step);
-    switch (model_.step_law) {
-      case StepLaw::gaussian:
-        walk_leg<StepLaw::gaussian>(step_, end);
-        break;
-      case StepLaw::persistent:
-        walk_leg<StepLaw::persistent>(step_, end);
-        break;
-      case StepLaw::heavy_tail:
-        walk_leg<StepLaw::heavy_tail>(step_, end);
-        break;
+  const bool takes = model_.bottom.active() || model_.top.active();
+  walk_legs(model_, table_, step_, step, [&](auto kind, std::int64_t begin, std::int64_t end) {
+    std::int64_t walked = 0;
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : walked) if (blocks() > 1)
+    for (std::int64_t b = 0; b < blocks(); ++b) {
+      walked += active_[b] * (end - begin);
+      walk_block<kind.step_law, kind.table, kind.drift>(b, begin, end);
+      if (takes && way_.size() == 0) compact(b);
     }
-    step_ = end;
-  }
+    steps_walked_ += walked;
+  });
 }
 
-Walkers::Counts Walkers::count(int bins) const {
-  Counts total;
+WalkCounts Walkers::count(int bins) const {
+  WalkCounts total;
   total.histogram.assign(bins, 0);
 #pragma omp parallel if (blocks() > 64)
   {
-    Counts mine;
+    WalkCounts mine;
     mine.histogram.assign(bins, 0);
 #pragma omp for schedule(static)
     for (std::int64_t b = 0; b < blocks(); ++b) {

@@ -28,11 +28,7 @@ class Walkers {
   /// Steps actually walked: absorbed walkers take none (granularity: a leg).
   std::int64_t steps_walked() const { return steps_walked_; }
 
-  struct Counts {
-    std::array<std::int64_t, 2> absorbed{}, trapped{};  ///< bottom, top
-    std::vector<std::int64_t> histogram;                ///< free walkers per bin of equal height
-  };
-  Counts count(int bins) const;
+  WalkCounts count(int bins) const;
 
   /// Mean (m) and variance (m2) of the way along the flow, over all walkers; needs track_flow_direction and
   /// faces that keep every walker.
@@ -45,12 +41,9 @@ class Walkers {
 
  private:
   static constexpr int width = 16, sets = 4, block = 1024;
-  static constexpr std::int64_t leg = 512;
 
   template <StepLaw S, bool Table, bool Drift>
   void walk_block(std::int64_t b, std::int64_t begin, std::int64_t end);
-  template <StepLaw S>
-  void walk_leg(std::int64_t begin, std::int64_t end);
   void compact(std::int64_t b);
   std::int64_t blocks() const { return static_cast<std::int64_t>(active_.size()); }
 

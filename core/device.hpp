@@ -19,6 +19,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -150,6 +151,10 @@ __global__ void __launch_bounds__(Body::threads) block_kernel(Body body) {
 
 }  // namespace detail
 
+inline constexpr const char* no_device =
+    "place: device asked for (no GPU is visible, or this program was built without CUDA) configure with "
+    "-D HEMOWALK_CUDA=ON on a machine with a GPU, or use place: host";
+
 /// Is there a GPU this process may use?
 inline bool device_present() {
 #if defined(HEMOWALK_CUDA)
@@ -158,6 +163,14 @@ inline bool device_present() {
 #else
   return false;
 #endif
+}
+
+/// Which of \p count devices this process takes: the ranks of a machine take turns. Their numbers on the
+/// machine are the launcher's: Open MPI's, or Slurm's.
+inline int device_of_process(int count) {
+  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_RANK", "SLURM_LOCALID"})
+    if (const char* value = std::getenv(name)) return std::atoi(value) % count;
+  return 0;
 }
 
 /// Memory of the host that a device's copies may read and write while the host goes on, for as long as this
@@ -206,10 +219,11 @@ class Queue {
   /// \throws InputError when a device is asked for and there is none.
   explicit Queue(Place place) : place_(place) {
     if (place == Place::host) return;
-    require(device_present(),
-            "place: device asked for (no GPU is visible, or this binary was built without CUDA) build the "
-            "cuda preset on a machine with a GPU, or use place: host");
+    require(device_present(), no_device);
 #if defined(HEMOWALK_CUDA)
+    int count = 1;
+    detail::check(cudaGetDeviceCount(&count), "counting devices");
+    detail::check(cudaSetDevice(device_of_process(count)), "choosing a device");
     detail::check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "creating a stream");
 #endif
   }

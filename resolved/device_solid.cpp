@@ -77,6 +77,7 @@ struct DeviceSolid<Real>::Share {
   mesh::HostFields<Real> host() {
     return std::visit([](auto& g) { return g.host_fields(); }, group.cells);
   }
+  void cut(int number);
   void enqueue(Part& part, const mesh::StepOptions& options);
 
   Group<Real>& group;
@@ -87,30 +88,34 @@ struct DeviceSolid<Real>::Share {
 };
 
 template <class Real>
-DeviceSolid<Real>::DeviceSolid(Place place, std::vector<Group<Real>>& groups, int parts) : place_(place) {
-  for (auto& group : groups) {
-    auto& share = *shares_.emplace_back(std::make_unique<Share>(place, group));
-    const auto host = share.host();
-    const std::size_t n = host.batches * host.batch_size();
-    for (const void* field : {static_cast<const void*>(host.predicted), static_cast<const void*>(host.offset),
-                              static_cast<const void*>(host.velocity), static_cast<const void*>(host.normal)})
-      share.pinned.emplace_back(place, field, n * sizeof(Real));
-    for (int p = 0; p < parts; ++p) {
-      const int first = host.batches * p / parts, last = host.batches * (p + 1) / parts;
-      if (last > first)
-        share.parts.push_back(std::make_unique<Part>(place, first, last - first, host.batch_size()));
-    }
-    // Idle lanes keep what they hold: it comes back with every step.
-    for (auto& part : share.parts) {
-      const std::size_t start = part->first * host.batch_size(), size = part->offset.size();
-      part->queue.copy(part->offset.data(), host.offset + start, size);
-      part->queue.copy(part->velocity.data(), host.velocity + start, size);
-      part->queue.copy(part->normal.data(), host.normal + start, size);
-      if (host.held) part->queue.copy(part->held.data(), host.held + start, size);
-      part->queue.copy(part->anchor.data(), host.anchor + part->first * 3 * mesh::lanes_of<Real>,
-                       part->anchor.size());
-      part->queue.wait();
-    }
+DeviceSolid<Real>::DeviceSolid(Place place, std::vector<Group<Real>>& groups, int parts) : parts_(parts) {
+  for (auto& group : groups) shares_.emplace_back(std::make_unique<Share>(place, group))->cut(parts_);
+}
+
+/// Parts of equal size, on their way as soon as they are full.
+template <class Real>
+void DeviceSolid<Real>::Share::cut(int number) {
+  const auto host = this->host();
+  const Place place = queue.place();
+  const std::size_t n = host.batches * host.batch_size();
+  parts.clear(), pinned.clear();
+  for (const void* field : {static_cast<const void*>(host.predicted), static_cast<const void*>(host.offset),
+                            static_cast<const void*>(host.velocity), static_cast<const void*>(host.normal)})
+    pinned.emplace_back(place, field, n * sizeof(Real));
+  for (int p = 0; p < number; ++p) {
+    const int first = host.batches * p / number, last = host.batches * (p + 1) / number;
+    if (last > first) parts.push_back(std::make_unique<Part>(place, first, last - first, host.batch_size()));
+  }
+  // Idle lanes keep what they hold: it comes back with every step.
+  for (auto& part : parts) {
+    const std::size_t start = part->first * host.batch_size(), size = part->offset.size();
+    part->queue.copy(part->offset.data(), host.offset + start, size);
+    part->queue.copy(part->velocity.data(), host.velocity + start, size);
+    part->queue.copy(part->normal.data(), host.normal + start, size);
+    if (host.held) part->queue.copy(part->held.data(), host.held + start, size);
+    part->queue.copy(part->anchor.data(), host.anchor + part->first * 3 * mesh::lanes_of<Real>,
+                     part->anchor.size());
+    part->queue.wait();
   }
 }
 
@@ -163,14 +168,31 @@ std::vector<mesh::StepReport> DeviceSolid<Real>::step(const mesh::StepOptions& o
 }
 
 template <class Real>
-void DeviceSolid<Real>::download() {
-  for (auto& share : shares_) {
+template <class Exchange>
+void DeviceSolid<Real>::for_groups(const Exchange& exchange) {
+  for (auto& share : shares_)
     if (auto* m = std::get_if<npfem::DeviceMembranes<Real>>(&share->cells))
-      m->download(std::get<npfem::Membranes<Real>>(share->group.cells));
+      exchange(*m, std::get<npfem::Membranes<Real>>(share->group.cells));
     else
-      std::get<rigid::DeviceBodies<Real>>(share->cells)
-          .download(std::get<rigid::RigidBodies<Real>>(share->group.cells));
-  }
+      exchange(std::get<rigid::DeviceBodies<Real>>(share->cells),
+               std::get<rigid::RigidBodies<Real>>(share->group.cells));
+}
+
+template <class Real>
+void DeviceSolid<Real>::download() {
+  for_groups([](const auto& device, auto& host) { device.download(host); });
+}
+
+template <class Real>
+void DeviceSolid<Real>::give_back() {
+  download();
+  for (auto& share : shares_) share->pinned.clear();
+}
+
+template <class Real>
+void DeviceSolid<Real>::take_over() {
+  for_groups([](auto& device, const auto& host) { device.upload(host); });
+  for (auto& share : shares_) share->cut(parts_);
 }
 
 template class DeviceSolid<float>;

@@ -1,7 +1,7 @@
 #pragma once
 /// \file DeviceSolid: only the cells' step on the device, fluid, coupling and contact on the host (the
-/// paper's hybrid). The groups are cut into equal parts once, each with a queue of its own, so that one part
-/// is copied while another computes: v_pred goes up; positions, velocities and normals come down. The rest of
+/// paper's hybrid). The groups are cut into equal parts, each with a queue of its own, so that one part is
+/// copied while another computes: v_pred goes up; positions, velocities and normals come down. The rest of
 /// the state stays on the device.
 
 #include <memory>
@@ -18,7 +18,7 @@ namespace hemowalk::resolved {
 template <class Real>
 class DeviceSolid {
  public:
-  /// Takes over the cells of \p groups, which must outlive this and keep their cells. \p parts per group.
+  /// Takes over the cells of \p groups, which must outlive this. \p parts per group.
   DeviceSolid(Place place, std::vector<Group<Real>>& groups, int parts = 4);
   ~DeviceSolid();
 
@@ -27,11 +27,18 @@ class DeviceSolid {
   /// What the host's fields do not hold (rounding residuals, orientations) comes down too: for checkpoints
   /// and output.
   void download();
+  /// Before cells come to the groups or go: all of their state is there, and their memory may move.
+  void give_back();
+  /// After it: takes over the cells that are there now.
+  void take_over();
 
  private:
   struct Part;
   struct Share;
-  Place place_;
+  template <class Exchange>
+  void for_groups(const Exchange& exchange);
+
+  int parts_;
   std::vector<std::unique_ptr<Share>> shares_;
 };
 

@@ -292,9 +292,9 @@ void Simulation<Real>::move_cells() {
   mesh::StepOptions options;
   options.iterations = scene_.coupling.iterations;
   solid_report_ = {};
-  const auto reports = solid_step_ ? solid_step_(options) : std::vector<mesh::StepReport>{};
+  const auto reports = solid_.step ? solid_.step(options) : std::vector<mesh::StepReport>{};
   for (auto& group : groups_) {
-    const auto report = solid_step_ ? reports[static_cast<std::size_t>(&group - groups_.data())]
+    const auto report = solid_.step ? reports[static_cast<std::size_t>(&group - groups_.data())]
                                     : std::visit([&](auto& g) { return g.step(options); }, group.cells);
     if (report.bad_cell >= 0) {
       const auto id = std::visit([&](const auto& g) { return g.id(report.bad_cell); }, group.cells);

@@ -114,10 +114,14 @@ class Simulation {
   View<const Node4<Real>> force() const { return force_.view(); }
   /// What interpolation reads: u* + theta/2 F_prev with halo.
   View<const Node4<Real>> velocity() const { return velocity_.view(); }
-  /// Who moves the cells instead of the groups themselves: from predicted() to positions, velocities and
-  /// normals, a report per group (place.solid: device). Empty: the groups.
-  using SolidStep = std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)>;
-  void set_solid_step(SolidStep step) { solid_step_ = std::move(step); }
+  /// Who moves the cells instead of the groups themselves (place.solid: device).
+  struct SolidElsewhere {
+    /// From predicted() to positions, velocities and normals; a report per group. Empty: the groups do it.
+    std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)> step;
+    std::function<void()> give_back;  ///< before cells come or go: all of their state into the groups
+    std::function<void()> take_over;  ///< after it
+  };
+  void set_solid(SolidElsewhere solid) { solid_ = std::move(solid); }
   /// Of this rank's cells.
   const contact::Summary& contact_summary() const { return contact_summary_; }
   /// Force of the cells on this rank's part of the lower and the upper wall in the last step, through kernels
@@ -206,7 +210,7 @@ class Simulation {
   Ring handing_over_;
   std::int64_t arrivals_ = 0;
 
-  SolidStep solid_step_;
+  SolidElsewhere solid_;
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;

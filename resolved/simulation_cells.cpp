@@ -193,6 +193,7 @@ void Simulation<Real>::hand_over() {
   bool any = false;
   for (const Side side : both_sides) any = any || copies_->leaving(side) || copies_->arriving(side);
   if (!any) return;
+  if (solid_.give_back) solid_.give_back();
   read_positions();
   std::vector<Impulses<Real>> impulses;
   std::vector<std::byte> outgoing[2], incoming;
@@ -251,6 +252,7 @@ void Simulation<Real>::hand_over() {
       for (int k = 0; k < vertices; ++k, j += 3)
         impulse_[groups_[i].marker(c, k)] = {j[0], j[1], j[2], Real(0)};
   }
+  if (solid_.take_over) solid_.take_over();
 }
 
 template void Simulation<float>::build_groups(const std::vector<InitialCell>&);

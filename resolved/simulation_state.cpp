@@ -126,6 +126,7 @@ void Simulation<Real>::load(View<const std::byte> state) {
       std::memcpy(static_cast<void*>(&force_[block_.at(0, j, k)]),
                   &part.force[(static_cast<std::size_t>(k) * block_.ny + j) * block_.nx],
                   block_.nx * sizeof(Node4<Real>));
+  if (solid_.give_back) solid_.give_back();
   for (std::size_t i = 0; i < groups_.size(); ++i)
     std::visit(
         [&](auto& g) {
@@ -138,6 +139,7 @@ void Simulation<Real>::load(View<const std::byte> state) {
           for (std::size_t at = 0; at < r.bytes.size(); at += r.length) g.load(r.bytes.data() + at);
         },
         groups_[i].cells);
+  if (solid_.take_over) solid_.take_over();
   arrange();
   std::memset(static_cast<void*>(impulse_.data()), 0, impulse_.size() * sizeof(Node4<Real>));
   for (std::size_t i = 0; i < groups_.size(); ++i)

@@ -32,21 +32,22 @@ Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
   const bool any = place.solid == Place::device;
   impl_ = std::make_unique<Impl>(simulation, any ? device : Place::host);
   if (!any) return;
-  require(
-      simulation.ranks().count() == 1,
-      "place: device on several ranks (the device's kernels know one block) use one rank, or place: host");
   if (place.fluid == Place::device) {
+    require(simulation.ranks().count() == 1,
+            "place: device on several ranks (the device's fluid and markers know one block) use one rank, "
+            "place: {solid: device}, or place: host");
     impl_->whole = std::make_unique<DeviceSimulation<Real>>(impl_->queue, simulation);
   } else {
     impl_->solid = std::make_unique<DeviceSolid<Real>>(device, simulation.groups());
-    simulation.set_solid_step(
-        [solid = impl_->solid.get()](const mesh::StepOptions& options) { return solid->step(options); });
+    DeviceSolid<Real>* solid = impl_->solid.get();
+    simulation.set_solid({[solid](const mesh::StepOptions& options) { return solid->step(options); },
+                          [solid] { solid->give_back(); }, [solid] { solid->take_over(); }});
   }
 }
 
 template <class Real>
 Stepper<Real>::~Stepper() {
-  if (impl_ && impl_->solid) impl_->simulation.set_solid_step({});
+  if (impl_ && impl_->solid) impl_->simulation.set_solid({});
 }
 
 template <class Real>

@@ -9,3 +9,6 @@ if(benchmark_FOUND)
   add_test(NAME bench_lbm COMMAND bench_lbm)
   set_tests_properties(bench_lbm PROPERTIES LABELS benchmark TIMEOUT 600)
 endif()
+# Run by hand: docs/evidence/gpu.md.
+add_executable(bench_half_storage benchmarks/bench_half_storage.cpp)
+target_link_libraries(bench_half_storage PRIVATE hemowalk_lbm)

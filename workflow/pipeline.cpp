@@ -55,6 +55,10 @@ class Pipeline {
         folder_(plan_.folder) {}
 
   PipelineSummary execute() {
+    for (const auto& the_case : campaign_.coarse) {
+      const std::string problem = coarse::place_problem(the_case);
+      require(problem.empty(), problem);
+    }
     fs::create_directories(folder_ / "runs");
     Lock lock(folder_ / ".lock");
     require(lock.held(), folder_.string() +

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "coarse/simulation.hpp"
 #include "core/check.hpp"
 #include "core/progress.hpp"
 #include "workflow/command.hpp"
@@ -185,6 +186,9 @@ Plan make_plan(const Campaign& campaign) {
   Plan plan;
   plan.folder = campaign.out;
   plan.warnings = campaign.warnings;
+  for (const auto& the_case : campaign.coarse)  // a plan may be made on another machine than the run
+    if (const std::string problem = coarse::place_problem(the_case); !problem.empty())
+      plan.warnings.push_back(problem);
   add_scenes(campaign, plan);
   add_sources(campaign, plan);
   require(!plan.runs.empty(),

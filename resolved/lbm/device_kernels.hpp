@@ -63,6 +63,17 @@ HEMO_HD HEMO_INLINE SlotOf<Real> slot_of(const Lattice<Real>& l, const NodeIndex
   return {l.f + static_cast<std::size_t>(opposite(I)) * l.stride + from, Real(0)};
 }
 
+/// Populations of a node before a step.
+template <bool odd, class Real>
+HEMO_HD HEMO_INLINE void load(const Lattice<Real>& l, const NodeIndex& x, std::uint32_t n,
+                              Real (&f)[directions]) {
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
+    constexpr int i = decltype(direction)::value;
+    const SlotOf<Real> slot = slot_of<i, odd>(l, x, n);
+    f[i] = *slot.p + slot.wall_term;
+  });
+}
+
 /// Collides node first + n in place. Nodes beside a wall leave the momentum they send into it.
 template <class Real, bool odd>
 struct CollideNodes {
@@ -75,11 +86,7 @@ struct CollideNodes {
     const auto n = static_cast<std::uint32_t>(first + index);
     const NodeIndex x = node_of(l, n);
     Real f[directions];
-    unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
-      constexpr int i = decltype(direction)::value;
-      const SlotOf<Real> slot = slot_of<i, odd>(l, x, n);
-      f[i] = *slot.p + slot.wall_term;
-    });
+    load<odd>(l, x, n, f);
     Real fx = l.body[0], fy = l.body[1], fz = l.body[2];
     if (force) {
       const Node4<Real> F = force[l.block.at(x.i, x.j, x.k)];
@@ -122,11 +129,7 @@ struct TakeMoments {
     const auto n = static_cast<std::uint32_t>(first + index);
     const NodeIndex x = node_of(l, n);
     Real f[directions];
-    unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
-      constexpr int i = decltype(direction)::value;
-      const SlotOf<Real> slot = slot_of<i, odd>(l, x, n);
-      f[i] = *slot.p + slot.wall_term;
-    });
+    load<odd>(l, x, n, f);
     split_parities(f);
     const Moments<Real> m = moments_of_parities(f);
     const Real inverse_density = Real(1) / (Real(1) + m.density);

@@ -49,18 +49,22 @@ struct Lists {
 }  // namespace
 
 template <class Real>
-DeviceMembranes<Real>::DeviceMembranes(Queue& queue, const Membranes<Real>& host)
-    : queue_(queue), count_(host.count()) {
+DeviceMembranes<Real>::DeviceMembranes(Queue& queue, const Membranes<Real>& host) : queue_(queue) {
   make_tables(host.type());
+  upload(host);
+}
+
+template <class Real>
+void DeviceMembranes<Real>::fit(int count) {
+  count_ = count;
   const std::size_t n = static_cast<std::size_t>(count_), pitch = static_cast<std::size_t>(tables_.pitch);
-  const Place place = queue.place();
+  const Place place = queue_.place();
   anchor_ = Array<double>(3 * n, place);
   for (auto* field : {&offset_, &residual_, &velocity_, &normal_, &predicted_})
     *field = Array<Real>(3 * n * pitch, place);
   report_ = Array<CellReport<Real>>(n, place);
   fields_ = {tables_.vertices, tables_.pitch,  anchor_.data(),   offset_.data(),
              velocity_.data(), normal_.data(), predicted_.data()};
-  upload(host);
 }
 
 template <class Real>
@@ -154,9 +158,7 @@ void DeviceMembranes<Real>::step(const StepOptions& options) {
 // each [vertex][3].
 template <class Real>
 void DeviceMembranes<Real>::upload(const Membranes<Real>& host) {
-  require(host.count() == count_,
-          "the number of cells has changed (the device has memory for the first number) make "
-          "the device's cells anew");
+  if (host.count() != count_ || !fields_.pitch) fit(host.count());
   Array<double> anchor(anchor_.size());
   std::array<Array<Real>, 4> field;
   for (auto& f : field) f = Array<Real>(offset_.size());

@@ -26,7 +26,8 @@ class DeviceMembranes {
   /// Enqueues one solid step of all cells from fields().predicted. Membranes::step defines what it does.
   void step(const StepOptions& options = {});
 
-  /// All cells' states, in order, without loss. Both wait.
+  /// All cells' states, in order, without loss. Both wait. upload() takes over any number of cells: fields()
+  /// and body() are new then.
   void upload(const Membranes<Real>& host);
   void download(Membranes<Real>& host) const;
   /// Of the last step; waits.
@@ -35,9 +36,10 @@ class DeviceMembranes {
 
  private:
   void make_tables(const CellType& type);
+  void fit(int count);
 
   Queue& queue_;
-  int count_;
+  int count_ = 0;
   MembraneTables<Real> tables_{};
   mesh::CellFields<Real> fields_{};
   Array<typename Tables<Real>::TriangleRow> triangle_;

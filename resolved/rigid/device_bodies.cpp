@@ -11,22 +11,27 @@ namespace hemowalk::rigid {
 template <class Real>
 DeviceBodies<Real>::DeviceBodies(Queue& queue, const RigidBodies<Real>& host)
     : queue_(queue),
-      count_(host.count()),
       gyration_(host.shape().gyration),
       arm_(make_array(queue.place(), host.shape().arm)),
       held_(make_array(queue.place(), host.shape().held)),
       shape_normal_(make_array(queue.place(), host.shape().normal)),
       metric_(make_array(queue.place(), host.type().metric)) {
-  const int pitch = mesh::CellFields<Real>::padded(host.vertices());
-  const std::size_t n = static_cast<std::size_t>(count_);
-  anchor_ = Array<double>(3 * n, queue.place());
-  motion_ = Array<BodyMotion>(n, queue.place());
-  couple_ = Array<Vec3>(n, queue.place());
-  for (auto* field : {&offset_, &held_now_, &velocity_, &normal_, &predicted_})
-    *field = Array<Real>(3 * n * static_cast<std::size_t>(pitch), queue.place());
-  fields_ = {host.vertices(),  pitch,          anchor_.data(),    offset_.data(),
-             velocity_.data(), normal_.data(), predicted_.data(), held_now_.data()};
   upload(host);
+}
+
+template <class Real>
+void DeviceBodies<Real>::fit(int count, int vertices) {
+  count_ = count;
+  const int pitch = mesh::CellFields<Real>::padded(vertices);
+  const std::size_t n = static_cast<std::size_t>(count);
+  const Place place = queue_.place();
+  anchor_ = Array<double>(3 * n, place);
+  motion_ = Array<BodyMotion>(n, place);
+  couple_ = Array<Vec3>(n, place);
+  for (auto* field : {&offset_, &held_now_, &velocity_, &normal_, &predicted_})
+    *field = Array<Real>(3 * n * static_cast<std::size_t>(pitch), place);
+  fields_ = {vertices,         pitch,          anchor_.data(),    offset_.data(),
+             velocity_.data(), normal_.data(), predicted_.data(), held_now_.data()};
 }
 
 template <class Real>
@@ -51,9 +56,7 @@ void DeviceBodies<Real>::step(const StepOptions& options) {
 // [vertex][3]; offsets and normals follow from the orientation.
 template <class Real>
 void DeviceBodies<Real>::upload(const RigidBodies<Real>& host) {
-  require(host.count() == count_,
-          "the number of bodies has changed (the device has memory for the first number) make "
-          "the device's bodies anew");
+  if (host.count() != count_ || !fields_.pitch) fit(host.count(), host.vertices());
   Array<double> anchor(anchor_.size());
   std::vector<BodyMotion> motion(static_cast<std::size_t>(count_));
   Array<Real> offset(offset_.size()), held(offset_.size()), velocity(offset_.size()), normal(offset_.size());

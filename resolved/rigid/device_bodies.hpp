@@ -25,14 +25,17 @@ class DeviceBodies {
   /// [cell] torque beside what v_pred carries, for the next step.
   Vec3* couples() { return couple_.data(); }
 
+  /// Takes over any number of bodies.
   void upload(const RigidBodies<Real>& host);
   void download(RigidBodies<Real>& host) const;
   StepReport report() const;
   std::size_t memory_bytes() const;
 
  private:
+  void fit(int count, int vertices);
+
   Queue& queue_;
-  int count_;
+  int count_ = 0;
   mesh::CellFields<Real> fields_{};
   Gyration gyration_;
   Array<Vec3> arm_, held_, shape_normal_;

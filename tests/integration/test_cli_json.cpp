@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/device.hpp"
 #include "integration/program.hpp"
 
 namespace hemowalk::test {
@@ -103,6 +104,54 @@ TEST(Json, EveryVerbPrintsOneObject) {
   for (const char* key : {"method", "reason", "time_s", "absorbed_fraction", "absorbed_sigma",
                           "absorbed_law_sigma", "profile", "walkers", "walker_steps_per_s", "wall_s"})
     EXPECT_TRUE(walk.contains(key)) << key;
+}
+
+const std::string slab =
+    "format: hemowalk.coarse/1\nlaw: {D: 100 um2/s}\nwalkers: 1e5\ndt: 1 s\nend: 600 s\nplace: ";
+
+// Nothing is started or written that this machine cannot finish; a check elsewhere only warns.
+TEST(DevicePlace, IsRefusedWhereThereIsNoGpu) {
+  if (device_present()) GTEST_SKIP() << "there is a device";
+  const Scratch scratch;
+  scratch.write("slab.yaml", slab + "device\n");
+  scratch.write("scene.yaml",
+                "format: hemowalk.scene/1\ndomain: {size: [10 um, 10 um, 10 um]}\ntime: {end: 1 us}\n"
+                "place: {fluid: device, coupling: device, solid: device}\n");
+  std::string with_device = campaign;
+  with_device.replace(with_device.find("end: 60 s"), 9, "end: 60 s, place: device");
+  scratch.write("campaign.yaml", with_device);
+  for (const char* words : {"coarse slab.yaml --out results", "resolve scene.yaml --out results",
+                            "run campaign.yaml --out results"}) {
+    const auto refused = hemowalk(scratch, words);
+    EXPECT_EQ(refused.code, 2) << words << refused.err;
+    EXPECT_NE(refused.err.find("no GPU is visible, or this program was built without CUDA"),
+              std::string::npos)
+        << words << refused.err;
+    EXPECT_FALSE(std::filesystem::exists(scratch.path() / "results")) << words;
+  }
+  for (const char* words : {"check slab.yaml --json", "check campaign.yaml --json"}) {
+    const auto check = hemowalk(scratch, words);
+    EXPECT_EQ(check.code, 0) << check.err;
+    EXPECT_EQ(object_of(check, "check")["warnings"].size(), 1u) << words;
+  }
+  scratch.write("nowhere.yaml", slab + "gpu\n");
+  const auto unknown = hemowalk(scratch, "check nowhere.yaml");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.err.find("nowhere.yaml:6:8"), std::string::npos) << unknown.err;
+}
+
+// The same random numbers: of 100 000 walkers below one in a thousand may fare otherwise by a rounding.
+TEST(DevicePlace, WalksTheSameWalk) {
+  if (!device_present()) GTEST_SKIP() << "no GPU is visible, or this program was built without CUDA";
+  const Scratch scratch;
+  Json walk[2];
+  for (const char* place : {"host", "device"}) {
+    scratch.write("slab.yaml", slab + place + "\n");
+    walk[place[0] == 'd'] = object_of(hemowalk(scratch, "coarse slab.yaml --json"), "coarse");
+  }
+  EXPECT_NE(walk[1]["reason"].get<std::string>().find("on the device"), std::string::npos);
+  EXPECT_GT(walk[0]["absorbed_fraction"][0], 0.1);
+  EXPECT_NEAR(walk[0]["absorbed_fraction"][0], walk[1]["absorbed_fraction"][0], 1e-3);
 }
 
 TEST(Json, ErrorsAreObjectsToo) {

@@ -14,6 +14,8 @@
 #include "resolved/gather.hpp"
 #include "resolved/resolve.hpp"
 #include "resolved/simulation.hpp"
+#include "resolved/stepper.hpp"
+#include "support/blood_scene.hpp"
 
 namespace hemowalk::resolved {
 namespace {
@@ -21,17 +23,7 @@ namespace {
 using test::world;
 
 /// 24 x 28 x 60 nodes: three slabs are just thick enough for a red cell.
-data::Scene long_scene(double acceleration = 32) {
-  data::Scene scene;
-  scene.domain.size = {12e-6, 14e-6, 30e-6};
-  scene.acceleration = acceleration;
-  data::Kind rbc, platelet;
-  rbc.name = "rbc";
-  platelet.name = "platelet", platelet.shape.type = data::Shape::Type::platelet, platelet.subdivision = 4;
-  platelet.law = data::Kind::Law::rigid;
-  scene.cells.kinds = {rbc, platelet};
-  return scene;
-}
+data::Scene long_scene(double acceleration = 32) { return test::plasma_scene({12, 14, 30}, acceleration); }
 
 /// Red cells across every border of two and of three slabs (planes 0, 20, 30, 40), in contact with each other
 /// and with platelets on the border; one platelet at the moving wall. Lattice units.
@@ -203,6 +195,72 @@ TEST(RanksOfTheSolver, CellsTravelThroughAllSlabs) {
       EXPECT_LT(largest_difference(end.position, one), 1e-9) << n << " ranks";
       EXPECT_LT(largest_difference(end.velocity, fluid), 1e-10 * scale) << n << " ranks";
     });
+}
+
+/// The paper's hybrid on ranks, each with a device for its cells; the kernels run on the host.
+data::Scene with_solid_on_device(data::Scene scene) {
+  scene.place.solid = Place::device;
+  return scene;
+}
+
+// Tolerances as between numbers of ranks, above.
+TEST(RanksOfTheSolver, HybridFollowsTheHost) {
+  for (const int n : {2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      Simulation<double> host(long_scene(), crowd(), ranks);
+      Simulation<double> hybrid(with_solid_on_device(long_scene()), crowd(), ranks);
+      Stepper<double> stepper(hybrid, Place::host);
+      const Whole start = whole(host);
+      for (int i = 0; i < 40; ++i) host.step(), stepper.step();
+      stepper.sync();
+      const Whole a = whole(host), b = whole(hybrid);
+      if (!ranks.root()) return;
+      EXPECT_GT(largest_difference(a.position, start.position), 0.1);
+      EXPECT_LT(largest_difference(a.position, b.position), 1e-11) << n << " ranks";
+      EXPECT_LT(largest_difference(a.velocity, b.velocity), 1e-10 * a.largest_speed) << n << " ranks";
+    });
+}
+
+// Cells that pass to another rank leave one device and enter another, with all of their state; so does a
+// state that is loaded, of a step in which other cells were on these ranks.
+TEST(RanksOfTheSolver, HybridHandsCellsOver) {
+  for (const int n : {2, 3})
+    on(n, [&](const mpi::Ranks& ranks) {
+      Simulation<double> host(fast_scene(), travellers(), ranks);
+      Simulation<double> hybrid(with_solid_on_device(fast_scene()), travellers(), ranks);
+      Stepper<double> stepper(hybrid, Place::host);
+      std::vector<std::byte> middle;
+      std::int64_t before = 0;
+      for (int i = 0; i < 120; ++i) {
+        if (i == 60) {
+          stepper.sync();
+          middle = hybrid.save();
+          before = hybrid.arrivals();
+        }
+        host.step(), stepper.step();
+      }
+      double arrivals = static_cast<double>(hybrid.arrivals() - before);
+      ranks.sum({&arrivals, 1});
+      EXPECT_GT(arrivals, 0) << "the stretch should see a cell pass";
+      stepper.sync();
+      const auto end = hybrid.save();
+      const Whole a = whole(host), b = whole(hybrid);
+      if (ranks.root()) {
+        EXPECT_LT(largest_difference(a.position, b.position), 1e-10) << n << " ranks";
+        EXPECT_LT(largest_difference(a.velocity, b.velocity), 1e-10 * a.largest_speed) << n << " ranks";
+      }
+      hybrid.load({middle.data(), middle.size()});
+      while (hybrid.fluid_steps() < 120) stepper.step();
+      stepper.sync();
+      EXPECT_TRUE(hybrid.save() == end) << "rank " << ranks.rank() << " of " << n;
+    });
+}
+
+TEST(RanksOfTheSolver, TheWholeStepOnDevicesIsRefused) {
+  data::Scene scene = long_scene();
+  scene.place = {Place::device, Place::device, Place::device};
+  Simulation<float> sim(scene, {crowd()[0]}, world());
+  EXPECT_THROW(Stepper<float>(sim, Place::host), InputError);
 }
 
 TEST(RanksOfTheSolver, ThreadsChangeNoBit) {

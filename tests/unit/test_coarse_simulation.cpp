@@ -104,6 +104,28 @@ TEST(CoarseRun, CarriesTheLawsUncertaintyToTheResult) {
   EXPECT_TRUE(std::isnan(run(c, exponent_only, o).absorbed_law_sigma[0]));
 }
 
+// place: device, its kernels run by the host: the same walk but for walkers whose fate hangs on a rounding.
+TEST(CoarseRun, GivesTheSameOnTheDevice) {
+  Case c = impact_r(1e-10);
+  RunOptions o;
+  o.device = Place::host;
+  const Result host = run(c, {}, o);
+  c.place = Place::device;
+  const Result device = run(c, {}, o);
+  EXPECT_EQ(device.reason, host.reason + ", on the device");
+  EXPECT_GT(device.walker_steps_per_s, 0);
+  ASSERT_EQ(device.absorbed_fraction.size(), 4u);
+  const double one = 1.0 / static_cast<double>(c.walkers);
+  for (std::size_t k = 0; k < 4; ++k)
+    EXPECT_NEAR(device.absorbed_fraction[k], host.absorbed_fraction[k], 5 * one);
+  ASSERT_EQ(device.profile.c.size(), host.profile.c.size());
+  for (std::size_t i = 0; i < host.profile.c.size(); ++i)
+    EXPECT_NEAR(device.profile.c[i], host.profile.c[i], 5 * 64 * one);
+  o.track_flow_direction = true;
+  c.bottom.type = Face::Type::reflect;
+  EXPECT_THROW(run(c, {}, o), InputError) << "the device does not keep the way along the flow";
+}
+
 TEST(CoarseRun, WarnsOutsideTheLawAndRefusesWhenStrict) {
   Case c = impact_r(0);
   c.constant_D.reset();

@@ -8,6 +8,19 @@
 namespace hemowalk {
 namespace {
 
+TEST(Devices, RanksOfAMachineTakeTurns) {
+  const std::pair<const char*, std::string> launchers[] = {{"SLURM_LOCALID", "3"},
+                                                           {"OMPI_COMM_WORLD_LOCAL_RANK", "5"}};
+  for (const auto& [name, value] : launchers) unsetenv(name);
+  EXPECT_EQ(device_of_process(4), 0);
+  for (const auto& [name, value] : launchers) {  // mpirun inside a Slurm job: Open MPI's number counts
+    setenv(name, value.c_str(), 1);
+    EXPECT_EQ(device_of_process(4), std::stoi(value) % 4);
+    EXPECT_EQ(device_of_process(1), 0);
+  }
+  for (const auto& [name, value] : launchers) unsetenv(name);
+}
+
 constexpr HostThreads orders[] = {HostThreads::forward, HostThreads::backward, HostThreads::scattered};
 
 struct CountVisits {

@@ -8,20 +8,15 @@
 
 #include "resolved/packing.hpp"
 #include "resolved/simulation.hpp"
+#include "support/blood_scene.hpp"
 
 namespace hemowalk::resolved {
 namespace {
 
 data::Scene blood(double box, double acceleration, double kappa) {
-  data::Scene scene;
-  scene.domain.size = {box, box, box};
+  data::Scene scene = test::blood_scene({box, box, box}, 0.35);
   scene.acceleration = acceleration;
-  data::Kind rbc, platelet;
-  rbc.name = "rbc", rbc.kappa_damping = kappa;
-  platelet.name = "platelet", platelet.shape.type = data::Shape::Type::platelet, platelet.subdivision = 4;
-  platelet.law = data::Kind::Law::rigid;
-  scene.cells.kinds = {rbc, platelet};
-  scene.cells.hematocrit = 0.35, scene.cells.platelets_per_rbc = 0.2;
+  scene.cells.kinds[0].kappa_damping = kappa;
   return scene;
 }
 
@@ -78,12 +73,12 @@ void expect_invariants(const data::Scene& scene, double end) {
   EXPECT_LT(residual, 1e-5);
 }
 
-TEST(Suspension, Box20) { expect_invariants(blood(20e-6, 50, 0.5), 22e-3); }
+TEST(Suspension, Box20) { expect_invariants(blood(20, 50, 0.5), 22e-3); }
 
 TEST(Suspension, Box50) {
   if (!std::getenv("HEMOWALK_BOX"))
     GTEST_SKIP() << "takes minutes to a quarter of an hour: set HEMOWALK_BOX=50";
-  expect_invariants(blood(50e-6, 16, 0.5), 20e-3);
+  expect_invariants(blood(50, 16, 0.5), 20e-3);
 }
 
 }  // namespace

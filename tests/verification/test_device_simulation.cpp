@@ -8,6 +8,7 @@
 #include "resolved/device_simulation.hpp"
 #include "resolved/device_solid.hpp"
 #include "resolved/stepper.hpp"
+#include "support/blood_scene.hpp"
 #include "support/places.hpp"
 
 namespace hemowalk::resolved {
@@ -18,17 +19,7 @@ using namespace hemowalk::test;
 class DeviceSimulationTest : public OnPlace {};
 HEMOWALK_ON_BOTH_PLACES(DeviceSimulationTest);
 
-data::Scene small_scene(double acceleration = 32) {
-  data::Scene scene;
-  scene.domain.size = {12e-6, 14e-6, 12e-6};
-  scene.acceleration = acceleration;
-  data::Kind rbc, platelet;
-  rbc.name = "rbc";
-  platelet.name = "platelet", platelet.shape.type = data::Shape::Type::platelet, platelet.subdivision = 4;
-  platelet.law = data::Kind::Law::rigid;
-  scene.cells.kinds = {rbc, platelet};
-  return scene;
-}
+data::Scene small_scene(double acceleration = 32) { return plasma_scene({12, 14, 12}, acceleration); }
 
 // Two red cells nearly touching, a platelet close to the moving wall, all near or across periodic faces.
 std::vector<InitialCell> small_crowd() {

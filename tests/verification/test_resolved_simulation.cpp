@@ -8,21 +8,12 @@
 
 #include "core/check.hpp"
 #include "resolved/simulation.hpp"
+#include "support/blood_scene.hpp"
 
 namespace hemowalk::resolved {
 namespace {
 
-data::Scene small_scene(double acceleration = 32) {
-  data::Scene scene;
-  scene.domain.size = {12e-6, 14e-6, 12e-6};
-  scene.acceleration = acceleration;
-  data::Kind rbc, platelet;
-  rbc.name = "rbc";
-  platelet.name = "platelet", platelet.shape.type = data::Shape::Type::platelet, platelet.subdivision = 4;
-  platelet.law = data::Kind::Law::rigid;
-  scene.cells.kinds = {rbc, platelet};
-  return scene;
-}
+data::Scene small_scene(double acceleration = 32) { return test::plasma_scene({12, 14, 12}, acceleration); }
 
 // Two red cells nearly touching, a platelet close to the moving wall. Lattice units.
 std::vector<InitialCell> small_crowd() {

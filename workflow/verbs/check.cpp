@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "coarse/case.hpp"
+#include "coarse/simulation.hpp"
 #include "core/check.hpp"
 #include "core/log.hpp"
 #include "core/provenance.hpp"
@@ -42,11 +42,13 @@ Finding check_campaign(const Flags& flags) {
 Finding check_coarse(const Flags& flags) {
   const auto the_case = coarse::read_case(flags.file, overrides(flags));
   if (!the_case.law_file.empty()) data::read_transport_law(the_case.law_file);
+  auto warnings = the_case.warnings;
+  if (const std::string problem = coarse::place_problem(the_case); !problem.empty())
+    warnings.push_back(problem);
   return {the_case.input_sha256,
           fmt::format("{} walkers, {:.4g} mm, {:.4g} s in steps of {:.4g} ms", the_case.walkers,
                       the_case.height * 1e3, the_case.end, the_case.dt * 1e3),
-          the_case.seed,
-          {}};
+          the_case.seed, warnings};
 }
 
 Finding check_law(const Flags& flags) {

@@ -20,12 +20,14 @@ namespace fs = std::filesystem;
 int coarse_walk(const Flags& flags, const std::string& method) {
   require(!flags.file.empty(), "coarse needs a case (coarse.yaml) give its file: hemowalk coarse FILE");
   const auto the_case = coarse::read_case(flags.file, overrides(flags));
+  const bool solve = method == "fokker_planck";
+  if (const std::string problem = coarse::place_problem(the_case); !solve) require(problem.empty(), problem);
   const auto law = the_case.constant_D ? data::TransportLaw::constant(*the_case.constant_D)
                                        : data::read_transport_law(the_case.law_file);
   Progress progress(the_case.name);
   coarse::RunOptions options;
   options.strict = flags.strict;
-  options.fokker_planck = method == "fokker_planck";
+  options.fokker_planck = solve;
   options.progress = [&](double fraction) {
     progress.update(fraction);
     if (stop_requested())

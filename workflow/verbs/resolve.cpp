@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "core/check.hpp"
+#include "core/device.hpp"
 #include "core/io.hpp"
 #include "core/log.hpp"
 #include "core/mpi.hpp"
@@ -83,6 +84,8 @@ int resolve(const Flags& flags, bool resume) {
   if (mpi::world_rank() != 0) set_log_level(LogLevel::error);
   const auto scene = data::read_scene(flags.file, overrides(flags));
   require_feasible(scene, flags.file);
+  require((scene.place.fluid == Place::host && scene.place.solid == Place::host) || device_present(),
+          flags.file + ": " + no_device);
   const std::string folder = flags.out.empty() ? "out/" + scene.input_sha256.substr(0, 12) : flags.out;
   const auto ranks = mpi::Ranks::world();
   std::unique_ptr<Lock> lock;
