@@ -1,6 +1,7 @@
 #include "resolved/build.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/check.hpp"
@@ -110,15 +111,32 @@ mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit) {
   return m;
 }
 
+namespace {
+
+/// How far the faces of a platelet are drawn back, in units of the retraction of a flat sheet; \p
+/// half_thickness in dx. Two faces that share kernels must come closer the thinner the platelet is. Measured
+/// (Jeffery period), linear in between: docs/evidence/validation.md, section 1.
+double platelet_face_depth(double half_thickness) {
+  constexpr std::array<std::array<double, 2>, 6> measured{
+      {{0.917, 1.245}, {1.1, 1.48}, {1.375, 1.767}, {1.65, 1.967}, {1.85, 1.90}, {2.2, 1.55}}};
+  std::size_t i = 1;
+  while (i + 1 < measured.size() && half_thickness > measured[i][0]) ++i;
+  const auto [x0, y0] = measured[i - 1];
+  const auto [x1, y1] = measured[i];
+  return std::max(1.0, y0 + (y1 - y0) * (half_thickness - x0) / (x1 - x0));
+}
+
+}  // namespace
+
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
                                         double retraction) {
-  // In units of the retraction of a flat sheet; measured: docs/evidence/validation.md, section 1.
-  constexpr double rim = 1.75, face = 1.5;
+  constexpr double rim = 1.58;  // in units of the retraction, likewise measured (drag)
   std::vector<mesh::Vec3> points = rest.vertices;
   if (kind.shape.type == data::Shape::Type::platelet) {
     mesh::Vec3 radius{};
     for (const auto& p : points)
       for (int d = 0; d < 3; ++d) radius[d] = std::max(radius[d], p[d]);
+    const double face = platelet_face_depth(radius[1]);
     const mesh::Vec3 depth{rim * retraction, face * retraction, rim * retraction};
     for (int d = 0; d < 3; ++d)
       require(depth[d] < radius[d], [&] {

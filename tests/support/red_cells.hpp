@@ -39,86 +39,108 @@ inline mesh::Observables observe(const resolved::Simulation<float>& sim, int gro
 struct Shear {
   double deformation = 0, inclination = 0;  ///< means over the second half of the run
   double marker_turn = 0;                   ///< |angle| the material marker went round the centre, rad
-  double axis_turn = 0;                     ///< |angle| the symmetry axis turned in the shear plane, rad
+  double axis_turn = 0;                     ///< |angle| the material's axis turned in the shear plane, rad
+  double shape_turn = 0;                    ///< |angle| the shape's long axis turned there, rad: tumbling
   double volume = 1;                        ///< at the end over the start
   mesh::Vec3 centre{};                      ///< at the end, dx
 };
 
-/// One red cell, its axis turned by \p angle out of the gradient direction, for a strain of \p strain.
+/// One red cell, its axis turned by \p angle out of the gradient direction, for a strain of \p strain; turns
+/// count from the strain \p from on.
 inline Shear red_cell_in_shear(double acceleration, double kappa, double strain, const mesh::Vec3& shift,
-                               double angle = 0.5) {
-  const auto scene = shear_scene({14, 16, 14}, acceleration, {red_cell_kind(kappa)});
+                               double angle = 0.5, double shear_rate = 100, double from = 0,
+                               double retraction = data::Coupling{}.retraction) {
+  auto scene = shear_scene({14, 16, 14}, acceleration, {red_cell_kind(kappa)});
+  scene.flow.shear_rate = shear_rate, scene.coupling.retraction = retraction;
   resolved::Simulation<float> sim(
       scene, {{0, {14 + shift[0], 16 + shift[1], 14 + shift[2]}, mesh::rotation({1, 0, 0}, angle), {}}});
-  const double rate = sim.units().rate(100);
-  const int steps = static_cast<int>(strain / rate), every = std::max(1, steps / 400);
+  const double rate = sim.units().rate(shear_rate);
+  const int steps = static_cast<int>(strain / rate), every = std::max(1, static_cast<int>(0.025 / rate));
   const auto unwrapped = [](double now, double before) { return std::remainder(now - before, 2 * M_PI); };
   mesh::Observables o = observe(sim, 0, 0);
   const double volume = o.volume;
   double marker = o.tank_treading_angle, axis = std::atan2(o.axis[1], o.axis[2]), samples = 0;
-  double turned = 0, tumbled = 0;
+  double shape = o.inclination, turned = 0, tumbled = 0, leant = 0;
   Shear out;
   for (int i = 1; i <= steps; ++i) {
     sim.step();
     if (i % every) continue;
     o = observe(sim, 0, 0);
-    turned += unwrapped(o.tank_treading_angle, marker), marker = o.tank_treading_angle;
     const double now = std::atan2(o.axis[1], o.axis[2]);
-    tumbled += unwrapped(now, axis), axis = now;
+    if (i * rate > from) {
+      turned += unwrapped(o.tank_treading_angle, marker), tumbled += unwrapped(now, axis);
+      leant += std::remainder(o.inclination - shape, M_PI);
+    }
+    marker = o.tank_treading_angle, axis = now, shape = o.inclination;
     if (2 * i > steps)
       out.deformation += o.taylor_deformation, out.inclination += o.inclination, samples += 1;
   }
   out.deformation /= samples, out.inclination /= samples;
-  out.marker_turn = std::abs(turned), out.axis_turn = std::abs(tumbled);
+  out.marker_turn = std::abs(turned), out.axis_turn = std::abs(tumbled), out.shape_turn = std::abs(leant);
   out.volume = o.volume / volume, out.centre = o.centre;
   return out;
 }
 
-/// Two bodies that pass each other: net separation across the flow after the encounter minus before, um.
-/// They start 11 um apart along the flow and \p offset um across it, and the run ends when they are as far
-/// apart on the other side.
-inline double net_displacement(double acceleration, bool with_platelet, double offset, double kappa = 0.5) {
+struct Collision {
+  double net = 0;   ///< um across the flow that each was moved by for good
+  double peak = 0;  ///< um, the most in between
+};
+
+/// Two bodies of \p kinds (the first and the last) that pass each other. They start \p apart um from each
+/// other along the flow and \p offset um across it, and the run ends when they are as far apart on the other
+/// side.
+inline Collision collide(std::vector<data::Kind> kinds, double acceleration, double offset,
+                         double apart = 11) {
   const data::Vec3 box{14, 18, 36};  // images along the flow stay farther away than the partner
-  std::vector<data::Kind> kinds{red_cell_kind(kappa)};
-  if (with_platelet) kinds.push_back(platelet_kind());
-  auto scene = shear_scene(box, acceleration, kinds);
-  const double half = offset / 2 / 0.5, apart = 11.0 / 2 / 0.5;  // dx
-  resolved::Simulation<float> sim(
-      scene, {{0, {14, 18 + half, 36 - apart}, mesh::identity_rotation, {}},
-              {with_platelet ? 1 : 0, {14, 18 - half, 36 + apart}, mesh::identity_rotation, {}}});
+  const int last = static_cast<int>(kinds.size()) - 1;
+  const auto scene = shear_scene(box, acceleration, std::move(kinds));
+  const double half = offset / 2 / 0.5, away = apart / 2 / 0.5;  // dx
+  resolved::Simulation<float> sim(scene, {{0, {14, 18 + half, 36 - away}, mesh::identity_rotation, {}},
+                                          {last, {14, 18 - half, 36 + away}, mesh::identity_rotation, {}}});
   const double rate = sim.units().rate(100);
-  const auto second = [&] { return with_platelet ? observe(sim, 1, 0) : observe(sim, 0, 1); };
+  const auto second = [&] { return last ? observe(sim, 1, 0) : observe(sim, 0, 1); };
   const double start = observe(sim, 0, 0).centre[1] - second().centre[1];
+  Collision out;
   for (int i = 1; i < 40 / rate; ++i) {
     sim.step();
     if (i % 50) continue;
     const auto a = observe(sim, 0, 0).centre, b = second().centre;
-    if (a[2] - b[2] > 2 * apart) return 0.5 * (a[1] - b[1] - start);
+    out.net = 0.25 * (a[1] - b[1] - start);  // half of it each, 0.5 um per dx
+    out.peak = std::max(out.peak, out.net);
+    if (a[2] - b[2] > 2 * away) return out;
   }
-  return std::nan("");
+  return {std::nan(""), std::nan("")};
 }
 
-/// Shape-recovery time, s: a red cell stretched by \p strain along x and released in fluid at rest; time
-/// constant of the extent along x from 80 to 40 % of the first excess over the rest length.
-inline double recovery_time(double kappa, double acceleration, double strain = 0.1) {
-  auto scene = shear_scene({14, 14, 14}, acceleration, {red_cell_kind(kappa)});
+/// Shape-recovery time, s: a red cell stretched by \p strain along its own x axis and released in fluid at
+/// rest; time constant of the displacement imposed from 80 to 40 % of it. Lattice of \p nodes a side.
+inline double recovery_time(double kappa, double acceleration,
+                            const mesh::Quaternion& orientation = mesh::identity_rotation, int nodes = 28,
+                            double strain = 0.1) {
+  const double box = nodes / 2, middle = nodes / 2.0;
+  auto scene = shear_scene({box, box, box}, acceleration, {red_cell_kind(kappa)});
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
-  const auto rest = resolved::make_mesh(scene.cells.kinds[0], scene.fluid.dx).vertices;
-  auto x = rest;
-  for (auto& p : x) p = {14 + p[0] * (1 + strain), 14 + p[1], 14 + p[2] / (1 + strain)};
-  resolved::Simulation<float> sim(scene, {{0, {14, 14, 14}, mesh::identity_rotation, x}});
+  auto rest = resolved::make_mesh(scene.cells.kinds[0], scene.fluid.dx).vertices;
+  auto x = rest, imposed = rest;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    const mesh::Vec3 p = rest[k];
+    imposed[k] = mesh::rotate(orientation, {p[0] * strain, 0, p[2] / (1 + strain) - p[2]});
+    rest[k] = mesh::rotate(orientation, p);
+    for (int d = 0; d < 3; ++d) x[k][d] = middle + rest[k][d] + imposed[k][d];
+  }
+  resolved::Simulation<float> sim(scene, {{0, {middle, middle, middle}, orientation, x}});
   const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
   // Projection on the displacement that was imposed.
   const auto excess = [&] {
     const auto now = cells.positions(0);
-    mesh::Vec3 middle{};
+    mesh::Vec3 centre{};
     for (const auto& p : now)
-      for (int d = 0; d < 3; ++d) middle[d] += p[d] / static_cast<double>(now.size());
+      for (int d = 0; d < 3; ++d) centre[d] += p[d] / static_cast<double>(now.size());
     double sum = 0, square = 0;
     for (std::size_t k = 0; k < now.size(); ++k)
-      for (const int d : {0, 2}) {
-        const double u = x[k][d] - 14 - rest[k][d];
-        sum += (now[k][d] - middle[d] - rest[k][d]) * u, square += u * u;
+      for (int d = 0; d < 3; ++d) {
+        const double u = imposed[k][d];
+        sum += (now[k][d] - centre[d] - rest[k][d]) * u, square += u * u;
       }
     return sum / square;
   };
