@@ -60,10 +60,10 @@ Recorder<Real>::Recorder(const Simulation<Real>& simulation) : planes_(simulatio
 }
 
 template <class Real>
-void Recorder<Real>::sample(Simulation<Real>& simulation) {
+void Recorder<Real>::sample(Simulation<Real>& simulation, const EnergyBudget& budget) {
   record_.time.push_back(simulation.time());
   sample_cells(simulation);
-  sample_diagnostics(simulation);
+  sample_diagnostics(simulation, budget);
 }
 
 template <class Real>
@@ -100,7 +100,7 @@ void Recorder<Real>::sample_cells(const Simulation<Real>& simulation) {
 }
 
 template <class Real>
-void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
+void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation, const EnergyBudget& budget) {
   const LatticeUnits& units = simulation.units();
   const data::Scene& scene = simulation.scene();
   const Momentum m = simulation.momentum();
@@ -146,7 +146,14 @@ void Recorder<Real>::sample_diagnostics(Simulation<Real>& simulation) {
   simulation.ranks().max({&overlap, 1});
   out.overlap_max.push_back(units.to_length(overlap));
   out.slip_rms.push_back(units.to_velocity(simulation.slip_rms()));
-  out.energy_residual.push_back(nan);  // not computed
+  out.energy_residual.push_back(budget.residual());
+  const auto put = [&](std::vector<double>& column, double power) {
+    column.push_back(budget.fed() != 0 ? units.to_power(power) : nan);
+  };
+  put(out.power_in, budget.fed()), put(out.power_viscous, budget.viscous);
+  put(out.power_damping, budget.damping), put(out.power_slip, budget.slip);
+  put(out.power_stressless, budget.stressless), put(out.power_membranes, budget.membranes);
+  put(out.power_contact, budget.contact), put(out.power_inertia, budget.inertia);
 }
 
 template <class Real>

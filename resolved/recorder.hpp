@@ -16,8 +16,9 @@ class Recorder {
   /// membrane).
   explicit Recorder(const Simulation<Real>& simulation);
 
-  /// Positions, orientations and shapes of all cells, and the diagnostics, at the present time.
-  void sample(Simulation<Real>& simulation);
+  /// Positions, orientations and shapes of all cells, and the diagnostics, at the present time. \p budget: of
+  /// the last step.
+  void sample(Simulation<Real>& simulation, const EnergyBudget& budget = {});
   /// Adds the present planar fields to the running profile averages.
   void accumulate_profile(const Simulation<Real>& simulation);
   /// Closes the averages since the last call into one profile at the present time.
@@ -31,7 +32,7 @@ class Recorder {
 
  private:
   void sample_cells(const Simulation<Real>& simulation);
-  void sample_diagnostics(Simulation<Real>& simulation);
+  void sample_diagnostics(Simulation<Real>& simulation, const EnergyBudget& budget);
 
   data::Trajectories record_;
   int planes_ = 0, averaged_ = 0;

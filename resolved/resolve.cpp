@@ -78,10 +78,11 @@ class Run {
     mpi::Agreement agreement(options_.ranks);
     Stepper<Real> stepper(simulation_);
     while (stepper.fluid_steps() < schedule_.end) {
-      stepper.step();
+      EnergyBudget budget;
+      stepper.step(sampled(stepper.fluid_steps() + scene_.coupling.solid_every) ? &budget : nullptr);
       const std::int64_t step = stepper.fluid_steps();
       if (wanted(step)) stepper.sync();
-      outputs(step);
+      outputs(step, budget);
       const bool by_clock = root() && scene_.time.checkpoint_wall > 0 &&
                             omp_get_wtime() - last_checkpoint > scene_.time.checkpoint_wall;
       const bool asked = options_.stop_requested && options_.stop_requested();
@@ -150,15 +151,17 @@ class Run {
   /// Will outputs() read the simulation?
   bool wanted(std::int64_t step) const {
     return due(step, schedule_.average) || due(step, schedule_.profile) || due(step, schedule_.surface) ||
-           due(step, schedule_.sample) || step >= schedule_.end;
+           sampled(step) || step >= schedule_.end;
   }
 
-  void outputs(std::int64_t step) {
+  bool sampled(std::int64_t step) const { return due(step, schedule_.sample); }
+
+  void outputs(std::int64_t step, const EnergyBudget& budget = {}) {
     if (due(step, schedule_.average) && step > 0) recorder_.accumulate_profile(simulation_);
     if (due(step, schedule_.profile)) recorder_.close_profile(simulation_);
     if (due(step, schedule_.surface)) write_surfaces();
-    if (!due(step, schedule_.sample)) return;
-    recorder_.sample(simulation_);
+    if (!sampled(step)) return;
+    recorder_.sample(simulation_, budget);
     if (!root()) return;
     guard();
     if (options_.progress)
@@ -271,8 +274,10 @@ class Run {
     t.profile.shear_stress.resize(profiles * Y);
     auto& d = t.diagnostics;
     d.time.resize(diagnostics), d.momentum_residual.resize(3 * diagnostics);
-    for (auto* v : {&d.energy_residual, &d.mass_error, &d.volume_error_max, &d.max_speed_ratio,
-                    &d.overlap_max, &d.slip_rms})
+    for (auto* v :
+         {&d.energy_residual, &d.mass_error, &d.volume_error_max, &d.max_speed_ratio, &d.overlap_max,
+          &d.slip_rms, &d.power_in, &d.power_viscous, &d.power_damping, &d.power_slip, &d.power_stressless,
+          &d.power_membranes, &d.power_contact, &d.power_inertia})
       v->resize(diagnostics);
   }
 

@@ -426,8 +426,9 @@ void Simulation<Real>::take_force_from_solid() {
 }
 
 template <class Real>
-void Simulation<Real>::step() {
+void Simulation<Real>::step(EnergyBudget* budget) {
   const double start = omp_get_wtime(), before = timings_.accounted();
+  if (budget) open_budget(*budget);
   if (any_cells_) {
     {
       Stopwatch watch(timings_.communication);
@@ -480,6 +481,7 @@ void Simulation<Real>::step() {
       any_cells_ ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
   for (int k = 0; k < scene_.coupling.solid_every; ++k) {
     const Real share = k + 1 == scene_.coupling.solid_every ? velocity_share() : Real(0);
+    if (budget) count_fluid(*budget, force, k == 0);
     {
       Stopwatch watch(timings_.fluid);
       fluid_.begin_advance(force, velocity_.view(), share);
@@ -505,6 +507,7 @@ void Simulation<Real>::step() {
     Stopwatch watch(timings_.communication);
     fields_.fill(velocity_.view());
   }
+  if (budget) close_budget(*budget);
   fluid_steps_ += scene_.coupling.solid_every;
   timings_.steps += scene_.coupling.solid_every;
   timings_.other += omp_get_wtime() - start - (timings_.accounted() - before);

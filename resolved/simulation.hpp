@@ -20,6 +20,7 @@
 #include "resolved/contact/contact.hpp"
 #include "resolved/copies.hpp"
 #include "resolved/decomposition.hpp"
+#include "resolved/energy.hpp"
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
@@ -91,8 +92,8 @@ class Simulation {
   Simulation(const data::Scene& scene, const std::vector<InitialCell>& cells, mpi::Ranks ranks = {});
 
   /// One coupling step: `solid_every` fluid steps and one solid step (all). \throws PhysicsError naming cell
-  /// and step.
-  void step();
+  /// and step. With \p budget also where its power goes, which costs some sweeps over fluid and cells.
+  void step(EnergyBudget* budget = nullptr);
 
   const data::Scene& scene() const { return scene_; }
   const LatticeUnits& units() const { return units_; }
@@ -168,6 +169,11 @@ class Simulation {
   void spread();
   void take_force_from_solid();
   void hand_over();
+  void open_budget(EnergyBudget& budget) const;
+  void count_fluid(EnergyBudget& budget, View<const Node4<Real>> force, bool first) const;
+  void close_budget(EnergyBudget& budget);
+  double wall_work() const;
+  double kinetic_energy() const;
   /// Interpolation reads u* + this share of F where one theta serves both directions.
   Real velocity_share() const {
     return one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n) : Real(0);

@@ -51,8 +51,8 @@ Stepper<Real>::~Stepper() {
 }
 
 template <class Real>
-void Stepper<Real>::step() {
-  impl_->whole ? impl_->whole->step() : impl_->simulation.step();
+void Stepper<Real>::step(EnergyBudget* budget) {
+  impl_->whole ? impl_->whole->step() : impl_->simulation.step(budget);
 }
 
 template <class Real>

@@ -24,8 +24,9 @@ class Stepper {
   Stepper(Simulation<Real>& simulation, Place device = Place::device);
   ~Stepper();
 
-  /// One coupling step. The Simulation may fall behind. \throws PhysicsError naming cell and step.
-  void step();
+  /// One coupling step. The Simulation may fall behind. \throws PhysicsError naming cell and step. \p budget:
+  /// as Simulation::step(); zeros where the whole step is on the device.
+  void step(EnergyBudget* budget = nullptr);
   /// Brings the Simulation up to date.
   void sync();
   std::int64_t fluid_steps() const;

@@ -54,6 +54,7 @@ struct LatticeUnits {
   double to_rate(double v) const { return v / (dt * s); }
   double to_time(double steps) const { return steps * dt * s; }
   double to_stress(double v) const { return v * density * dx * dx / (dt * dt) / s; }
+  double to_power(double v) const { return v * density * dx * dx * dx * dx * dx / (dt * dt * dt) / (s * s); }
   double to_force(double v) const { return v * density * dx * dx * dx * dx / (dt * dt) / s; }
 };
 

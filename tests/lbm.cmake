@@ -1,6 +1,6 @@
 hemowalk_test(test_lbm_fluid SOURCES unit/test_lbm_fluid.cpp LINK hemowalk_lbm LABELS unit)
 hemowalk_test(test_lbm_divided SOURCES unit/test_lbm_divided.cpp LINK hemowalk_lbm LABELS unit)
-hemowalk_test(test_lbm_flows SOURCES verification/test_lbm_flows.cpp LINK hemowalk_lbm LABELS verification)
+hemowalk_test(test_lbm_flows SOURCES verification/test_lbm_flows.cpp verification/test_lbm_energy.cpp LINK hemowalk_lbm LABELS verification)
 
 find_package(benchmark QUIET)
 if(benchmark_FOUND)

@@ -2,7 +2,7 @@ if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
-            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp
+            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp
     LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
   add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)
@@ -20,5 +20,6 @@ if(TARGET hemowalk_resolved)
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
   hemowalk_test(validate_rheology SOURCES validation/test_rheology.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 7200)
+  hemowalk_test(validate_energy SOURCES validation/test_energy.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
   hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp validation/test_red_cells.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
 endif()

@@ -95,6 +95,9 @@ T samples, N cells of a kind, P profiles, Y heights, K diagnostics. NaN = not kn
 | `/diagnostics/energy_residual`, `mass_error`, `volume_error_max`, `max_speed_ratio` | K | 1 |
 | `/diagnostics/overlap_max` | K | m |
 | `/diagnostics/slip_rms` | K | m/s |
+| `/diagnostics/power_in` (walls, body force, loads) | K | W |
+| `/diagnostics/power_viscous`, `power_damping`, `power_slip`, `power_stressless` (lost; the last two to the lattice) | K | W |
+| `/diagnostics/power_membranes`, `power_contact`, `power_inertia` (stored) | K | W |
 )";
 
 }  // namespace

@@ -44,7 +44,15 @@ constexpr Column<Diagnostics> diagnostics_columns[] = {
     {"volume_error_max", "1", 1, &Diagnostics::volume_error_max},
     {"max_speed_ratio", "1", 1, &Diagnostics::max_speed_ratio},
     {"overlap_max", "m", 1, &Diagnostics::overlap_max},
-    {"slip_rms", "m/s", 1, &Diagnostics::slip_rms}};
+    {"slip_rms", "m/s", 1, &Diagnostics::slip_rms},
+    {"power_in", "W", 1, &Diagnostics::power_in},
+    {"power_viscous", "W", 1, &Diagnostics::power_viscous},
+    {"power_damping", "W", 1, &Diagnostics::power_damping},
+    {"power_slip", "W", 1, &Diagnostics::power_slip},
+    {"power_stressless", "W", 1, &Diagnostics::power_stressless},
+    {"power_membranes", "W", 1, &Diagnostics::power_membranes},
+    {"power_contact", "W", 1, &Diagnostics::power_contact},
+    {"power_inertia", "W", 1, &Diagnostics::power_inertia}};
 constexpr Column<Profiles> profile_columns[] = {{"velocity", "m/s", 3, &Profiles::velocity},
                                                 {"hematocrit", "1", 1, &Profiles::hematocrit},
                                                 {"shear_stress", "Pa", 1, &Profiles::shear_stress}};

@@ -37,6 +37,10 @@ struct Diagnostics {
   std::vector<double> momentum_residual;  ///< [K*3] relative
   std::vector<double> energy_residual, mass_error, volume_error_max, max_speed_ratio, overlap_max,
       slip_rms;  ///< [K]
+  /// [K] W: fed in by walls, body force and loads; lost to viscosity, membrane damping, slip and lattice
+  /// modes without stress (both numerical); stored in membranes, contact and inertia.
+  std::vector<double> power_in, power_viscous, power_damping, power_slip, power_stressless, power_membranes,
+      power_contact, power_inertia;
 };
 
 /// What the resolved solver hands to calibration; also what published data are imported into.

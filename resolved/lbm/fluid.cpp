@@ -14,9 +14,6 @@ namespace {
 
 constexpr std::size_t round_up(std::size_t n, std::size_t to) { return (n + to - 1) / to * to; }
 
-double omega_minus(const Parameters& p) {
-  return p.collision == Collision::bgk ? 1 / p.tau : 1 / (0.5 + p.magic / (p.tau - 0.5));
-}
 double force_shift(const Parameters& p) {
   return p.forcing == Forcing::guo ? 0.5 - 1 / (8 * p.tau) : p.tau / 2;
 }
@@ -34,7 +31,7 @@ Fluid<Real>::Fluid(const Block& block, const Parameters& parameters)
           "magic = " + std::to_string(parameters.magic) + " (TRT needs Lambda > 0) use 0.1875");
   require(!parameters.walls_y || block.ny >= 2,
           "one node between the walls (a row cannot touch both) give y at least two nodes");
-  rate_ = Relaxation<Real>::make(1 / parameters.tau, omega_minus(parameters), force_shift(parameters));
+  rate_ = Relaxation<Real>::make(1 / parameters.tau, odd_rate(parameters), force_shift(parameters));
   fluid_nodes_ = block.interior();
   pitch_ = round_up(static_cast<std::size_t>(block.nx) + 2, 16);
   const auto ny = static_cast<std::size_t>(block.ny), nz = static_cast<std::size_t>(block.nz);

@@ -40,6 +40,11 @@ struct Parameters {
   bool divided_z = false;
 };
 
+/// Relaxation rate of the odd populations, omega_minus.
+inline double odd_rate(const Parameters& p) {
+  return p.collision == Collision::bgk ? 1 / p.tau : 1 / (0.5 + p.magic / (p.tau - 0.5));
+}
+
 /// The two ends of a block along z.
 enum class Side { low, high };
 
@@ -60,6 +65,20 @@ struct WallImpulse {
 struct Totals {
   double mass = 0;  ///< sum of rho - 1
   Vec3 momentum{};  ///< sum of c_i f_i, i.e. before the coming step's force
+};
+
+/// Energy of the fluid and what the coming collision does to it, sums over all fluid nodes, in double
+/// (lattice units). In the square norm of the populations, (1/6) sum g_i^2/w_i, streaming changes nothing, a
+/// wall adds its velocity times the momentum it gives, a force F adds F.(j + F/2), and collision removes
+/// omega (2 - omega)/6 sum m_i^2/w_i of each parity m of the non-equilibrium part. So over a step
+///     held(after) - held(before) = force + body_force - viscous - stressless - velocity.impulse of the walls
+/// up to terms cubic in the velocity (the square norm is that of the linear equilibrium).
+struct EnergyFlows {
+  double held = 0;        ///< 1/2 j^2 + (rho - 1)^2/6 + the non-equilibrium part
+  double viscous = 0;     ///< 3/2 omega (2 - omega)/2 Pi_neq:Pi_neq = 2 mu S:S, per step
+  double stressless = 0;  ///< what moments beyond the stress lose: of the lattice, no physics
+  double force = 0;       ///< work of the force field
+  double body_force = 0;  ///< work of the body force
 };
 
 /// Averages over the fluid nodes of each plane y = j + 1/2.
@@ -137,6 +156,8 @@ class Fluid {
 
   WallImpulse wall_impulse() const;
   Totals totals() const;
+  /// Energy now, and its flows in a step that begins with \p force (empty: body force only). Costs a sweep.
+  EnergyFlows energy(View<const Node4<Real>> force) const;
   /// Profiles of the current state; \p force is the field that acts (or acted last), empty = body force only.
   PlanarProfiles profiles(View<const Node4<Real>> force) const;
 
@@ -169,6 +190,8 @@ class Fluid {
   void locate_node(int i, int j, int k, bool swapped, Real* (&p)[directions],
                    Real (&wall_term)[directions]) const;
   void populations(int i, int j, int k, double (&f)[directions]) const;
+  template <class Body>
+  void visit_plane(int k, const Body& body) const;
   void set_populations(int i, int j, int k, const std::function<FlowPoint(double, double, double)>& flow);
   void collide_row(int j, int k, View<const Node4<Real>> force);
   void collide_node(int i, int j, int k, const Node4<Real>* force, double (&outgoing)[3],

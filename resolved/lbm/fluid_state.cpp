@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "core/check.hpp"
+#include "core/simd.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/lbm/state.hpp"
 
@@ -107,28 +108,132 @@ WallImpulse Fluid<Real>::wall_impulse() const {
   return sum;
 }
 
+namespace {
+
+inline double sum_of(double v) { return v; }
+template <class N>
+double sum_of(const N& v) {
+  return stdx::reduce(v);
+}
+
+}  // namespace
+
+/// body(f, j, i) for the fluid nodes of plane k: f the deviations after streaming, of node i alone (double)
+/// or of as many nodes from i on as a pack of double holds.
+template <class Real>
+template <class Body>
+void Fluid<Real>::visit_plane(int k, const Body& body) const {
+  constexpr int W = 8;
+  using N = Pack<double, W>;
+  for (int j = 0; j < block_.ny; ++j) {
+    const bool plain = mixed_.empty() || !mixed_[static_cast<std::size_t>(k) * block_.ny + j];
+    const RowPointers<Real> row = locate(j, k, swapped_);
+    int i = 0;
+    for (; plain && i + W <= block_.nx; i += W) {
+      N f[directions];
+      for (int d = 0; d < directions; ++d) {
+        alignas(64) double lane[W];
+        for (int l = 0; l < W; ++l) lane[l] = static_cast<double>(row.p[d][i + l] + row.wall_term[d]);
+        f[d] = N(lane, stdx::element_aligned);
+      }
+      body(f, j, i);
+    }
+    for (; i < block_.nx; ++i) {
+      if (is_solid(i, j, k)) continue;
+      double f[directions];
+      populations(i, j, k, f);
+      body(f, j, i);
+    }
+  }
+}
+
 template <class Real>
 Totals Fluid<Real>::totals() const {
   std::vector<Totals> plane(block_.nz);
 #pragma omp parallel for schedule(static) num_threads(threads())
   for (int k = 0; k < block_.nz; ++k) {
-    Totals sum;
-    for (int j = 0; j < block_.ny; ++j)
-      for (int i = 0; i < block_.nx; ++i) {
-        if (is_solid(i, j, k)) continue;
-        double f[directions];
-        populations(i, j, k, f);
-        split_parities(f);
-        const Moments<double> m = moments_of_parities(f);
-        sum.mass += m.density;
-        sum.momentum = {sum.momentum[0] + m.x, sum.momentum[1] + m.y, sum.momentum[2] + m.z};
-      }
-    plane[k] = sum;
+    Totals& sum = plane[k];
+    visit_plane(k, [&](auto& f, int, int) {
+      split_parities(f);
+      const auto m = moments_of_parities(f);
+      sum.mass += sum_of(m.density);
+      sum.momentum[0] += sum_of(m.x), sum.momentum[1] += sum_of(m.y), sum.momentum[2] += sum_of(m.z);
+    });
   }
   Totals total;
   for (const Totals& p : plane) {
     total.mass += p.mass;
     for (int a = 0; a < 3; ++a) total.momentum[a] += p.momentum[a];
+  }
+  return total;
+}
+
+namespace {
+
+/// Energy and losses of nodes in their coming collision, added to \p sum. \p f: deviations; even and odd
+/// parts separate because the norm does.
+template <class N>
+HEMO_INLINE void add_energy(N (&f)[directions], const N (&F)[3], const Vec3& g, double even_loss,
+                            double odd_loss, EnergyFlows& sum) {
+  N held(0), even(0), odd(0);
+  unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
+    constexpr int i = decltype(direction)::value;
+    held += f[i] * f[i] * (1 / (6 * weight(i)));
+  });
+  split_parities(f);
+  const Moments<N> m = moments_of_parities(f);
+  const N inverse = 1 / (1 + m.density), jj = (m.x * m.x + m.y * m.y + m.z * m.z) * inverse;
+  const N isotropic = m.density - 1.5 * jj, rest = f[0] - isotropic * (1.0 / 3);
+  N xx(0), yy(0), zz(0), xy(0), xz(0), yz(0);
+  unroll<9>([&](auto pair) HEMO_INLINE_LAMBDA {
+    constexpr int i = 2 * decltype(pair)::value + 1, x = c[i][0], y = c[i][1], z = c[i][2];
+    constexpr double w = weight(i);
+    const N cj = along<i>(m.x, m.y, m.z);
+    const N s = f[i] - 2 * w * (isotropic + 4.5 * cj * cj * inverse), a = f[i + 1] - 6 * w * cj;
+    even += s * s * (0.5 / w), odd += a * a * (0.5 / w);  // two directions, half of the sum in each
+    if constexpr (x != 0) xx += s;
+    if constexpr (y != 0) yy += s;
+    if constexpr (z != 0) zz += s;
+    if constexpr (x * y != 0) xy += x * y * s;
+    if constexpr (x * z != 0) xz += x * z * s;
+    if constexpr (y * z != 0) yz += y * z * s;
+  });
+  const N viscous = 4.5 * even_loss * (xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
+  const N ux = m.x + 0.5 * (F[0] + g[0]), uy = m.y + 0.5 * (F[1] + g[1]), uz = m.z + 0.5 * (F[2] + g[2]);
+  sum.held += sum_of(held), sum.viscous += sum_of(viscous);
+  sum.stressless += sum_of(N(even_loss * (even + 3 * rest * rest) + odd_loss * odd - viscous));
+  sum.force += sum_of(N(F[0] * ux + F[1] * uy + F[2] * uz));
+  sum.body_force += sum_of(N(g[0] * ux + g[1] * uy + g[2] * uz));
+}
+
+}  // namespace
+
+template <class Real>
+EnergyFlows Fluid<Real>::energy(View<const Node4<Real>> force) const {
+  std::vector<EnergyFlows> plane(block_.nz);
+  const auto loss = [](double omega) { return omega * (2 - omega) / 6; };
+  const double even = loss(1 / parameters_.tau), odd = loss(odd_rate(parameters_));
+#pragma omp parallel for schedule(static) num_threads(threads())
+  for (int k = 0; k < block_.nz; ++k)
+    visit_plane(k, [&](auto& f, int j, int i) {
+      using N = std::remove_reference_t<decltype(f[0])>;
+      N F[3] = {N(0), N(0), N(0)};
+      if (force.data) {
+        const Node4<Real>* at = force.data + block_.at(i, j, k);
+        if constexpr (std::is_same_v<N, double>) {
+          F[0] = at->x, F[1] = at->y, F[2] = at->z;
+        } else {
+          F[0] = N([&](auto l) { return static_cast<double>(at[l].x); });
+          F[1] = N([&](auto l) { return static_cast<double>(at[l].y); });
+          F[2] = N([&](auto l) { return static_cast<double>(at[l].z); });
+        }
+      }
+      add_energy(f, F, parameters_.body_force, even, odd, plane[k]);
+    });
+  EnergyFlows total;
+  for (const EnergyFlows& p : plane) {
+    total.held += p.held, total.viscous += p.viscous, total.stressless += p.stressless;
+    total.force += p.force, total.body_force += p.body_force;
   }
   return total;
 }
@@ -269,6 +374,7 @@ std::size_t Fluid<Real>::memory_bytes() const {
   template void Fluid<Real>::populations(int, int, int, double(&)[directions]) const;                  \
   template WallImpulse Fluid<Real>::wall_impulse() const;                                              \
   template Totals Fluid<Real>::totals() const;                                                         \
+  template EnergyFlows Fluid<Real>::energy(View<const Node4<Real>>) const;                             \
   template PlanarProfiles Fluid<Real>::profiles(View<const Node4<Real>>) const;                        \
   template std::vector<std::byte> Fluid<Real>::save() const;                                           \
   template void Fluid<Real>::load(View<const std::byte>);                                              \

@@ -223,6 +223,18 @@ void BatchKernel<Real>::forces(const BatchFields<Real>& b) {
 }
 
 template <class Real>
+auto BatchKernel<Real>::stored_power(const BatchFields<Real>& b) -> P {
+  const Real half = t_.h / 2;
+  for (int k = 0; k < t_.vertices; ++k)
+    store3(load3(b.residual, k) - half * load3(b.velocity, k), s_.moved.data(), k);
+  const P p = membrane_forces(b.offset);
+  P power(0);
+  for (int k = 0; k < t_.vertices; ++k)
+    power += dot(p * load3(s_.gradient.data(), k) - load3(s_.force.data(), k), load3(b.velocity, k));
+  return power;
+}
+
+template <class Real>
 [[gnu::flatten]] auto BatchKernel<Real>::find_frame(const BatchFields<Real>& b) -> Frame {
   mesh::Inertia<P> inertia;
   mesh::Momentum<P> momentum;

@@ -56,6 +56,9 @@ class BatchKernel {
   Report step(const BatchFields<Real>& b, const mesh::StepOptions& options);
   /// F_int at the present positions, into scratch.force.
   void forces(const BatchFields<Real>& b);
+  /// -F_int.v per lane with F_int at x - h v/2, x the positions that the last step of h v led to: the rate at
+  /// which that step stored elastic energy, up to h^2.
+  P stored_power(const BatchFields<Real>& b);
   void update_normals(const BatchFields<Real>& b);
 
  private:

@@ -345,6 +345,32 @@ template <class Real>
 double Membranes<Real>::energy(int c) const {
   return npfem::energy(*impl_->type, positions(c)).total();
 }
+template <class Real>
+double Membranes<Real>::stored_power() {
+  impl_->add_scratch();
+  const int n = batches();
+  std::vector<double> of_cell(static_cast<std::size_t>(n) * lanes);
+#pragma omp parallel for schedule(static)
+  for (int b = 0; b < n; ++b) {
+    const auto power =
+        BatchKernel<Real>(impl_->tables, impl_->scratch[omp_get_thread_num()]).stored_power(impl_->batch(b));
+    for (int lane = 0; lane < lanes; ++lane) of_cell[b * lanes + lane] = Real(power[lane]);
+  }
+  double sum = 0;
+  for (int c = 0; c < count(); ++c) sum += of_cell[c];
+  return sum;
+}
+
+template <class Real>
+double Membranes<Real>::damping_power(int c) const {
+  auto x = positions(c);
+  std::vector<Vec3> v(x.size());
+  for (int k = 0; k < vertices(); ++k) {
+    for (int d = 0; d < 3; ++d) v[k][d] = impl_->velocity[layout().at(c, k, d)];
+    mesh::accumulate(x[k], -h(), v[k]);
+  }
+  return npfem::damping_power(*impl_->type, x, v);
+}
 
 template class Membranes<float>;
 template class Membranes<double>;

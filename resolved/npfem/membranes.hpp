@@ -87,6 +87,10 @@ class Membranes {
   double volume(int c) const;
   double area(int c) const;
   double energy(int c) const;  ///< elastic, by the reference path
+  /// Power that kappa and Rayleigh damping took in the last step, by the reference path.
+  double damping_power(int c) const;
+  /// Power that went into elastic energy in the last step, of all cells, by the fast path.
+  double stored_power();
 
  private:
   struct Impl;

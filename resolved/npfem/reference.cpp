@@ -148,6 +148,15 @@ void axpy(double s, const Field& a, Field& y) {
   for (std::size_t k = 0; k < a.size(); ++k) mesh::accumulate(y[k], s, a[k]);
 }
 
+Field lap(const CellType& type, const Field& d) {
+  Field y(d.size(), Vec3{});
+  for (const auto& e : type.laplacian()) {
+    mesh::accumulate(y[e.row], e.value, d[e.column]);
+    if (e.row != e.column) mesh::accumulate(y[e.column], e.value, d[e.row]);
+  }
+  return y;
+}
+
 /// The incremental potential g(d) = sum metric/(2 h^2) |d - h v_pred|^2 + E(x + d) + beta/(2h) d Lap d, and
 /// its slope.
 class Potential {
@@ -165,7 +174,7 @@ class Potential {
       sum += rate(k) / 2 * mesh::dot(gap, gap);
     }
     if (type_.material().rayleigh_beta > 0)
-      sum += type_.material().rayleigh_beta / (2 * h) * inner(d, lap(d));
+      sum += type_.material().rayleigh_beta / (2 * h) * inner(d, lap(type_, d));
     return sum;
   }
   /// -dg/dd; \p scale receives the size of the inertial forces.
@@ -182,21 +191,13 @@ class Potential {
       scale += m * m * h * h * mesh::dot(v_pred_[k], v_pred_[k]) + mesh::dot(inertia, inertia);
     }
     scale = std::sqrt(scale);
-    if (type_.material().rayleigh_beta > 0) axpy(-type_.material().rayleigh_beta / h, lap(d), r);
+    if (type_.material().rayleigh_beta > 0) axpy(-type_.material().rayleigh_beta / h, lap(type_, d), r);
     return r;
   }
 
  private:
   double rate(std::size_t k) const {
     return type_.metric()[k] / (type_.h() * type_.h() * (1 - type_.kappa()[k]));
-  }
-  Field lap(const Field& d) const {
-    Field y(d.size(), Vec3{});
-    for (const auto& e : type_.laplacian()) {
-      mesh::accumulate(y[e.row], e.value, d[e.column]);
-      if (e.row != e.column) mesh::accumulate(y[e.column], e.value, d[e.row]);
-    }
-    return y;
   }
   const CellType& type_;
   const State& s_;
@@ -376,6 +377,17 @@ SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, d
   }
   axpy(h, s.v, s.x);
   return report;
+}
+
+double damping_power(const CellType& type, const Field& x, const Field& v) {
+  const auto rigid = rigid_part(type, x, v);
+  double power = 0;
+  for (std::size_t k = 0; k < v.size(); ++k) {
+    const auto own = mesh::subtract(v[k], rigid[k]);
+    power += type.material().drag_per_area * type.vertex_areas()[k] * mesh::dot(own, own);
+  }
+  const double beta = type.material().rayleigh_beta;
+  return beta > 0 ? power + beta * inner(v, lap(type, v)) : power;
 }
 
 void step_rk4(const CellType& type, State& s, double t, double dt, const ExternalForce& external) {

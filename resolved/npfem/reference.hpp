@@ -22,6 +22,11 @@ Energy energy(const CellType& type, const std::vector<mesh::Vec3>& x);
 /// F_int at \p x: the same term functions as the fast path, with T = double.
 std::vector<mesh::Vec3> forces(const CellType& type, const std::vector<mesh::Vec3>& x);
 
+/// Power lost to kappa damping, sum c_k |v - v_rigid|^2 with c_k = c_A A_k and the rigid motion of the step's
+/// metric, and to Rayleigh damping, beta v.Lap v; at \p x with velocities \p v.
+double damping_power(const CellType& type, const std::vector<mesh::Vec3>& x,
+                     const std::vector<mesh::Vec3>& v);
+
 /// State of one cell.
 struct State {
   std::vector<mesh::Vec3> x, v;

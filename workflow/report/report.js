@@ -268,6 +268,7 @@ function diagnostics() {
     if (series.length) lineChart(grid, {title, note, x: {label: "time (ms)", scale: ms}, y: {label, log}, series, height: 230});
   };
   chart("Momentum residual", "Fluid, cells and walls together, relative.", "momentum_residual", "relative", true);
+  chart("Energy residual", "Power of the walls that no term of the budget accounts for, relative.", "energy_residual", "relative", false);
   chart("Largest volume error of a cell", null, "volume_error_max", "relative", false);
   chart("Mass error", null, "mass_error", "relative", false);
   chart("Largest speed over wall speed", null, "max_speed_ratio", "ratio", false);
