@@ -248,6 +248,31 @@ TEST(PaperCoupling, VelocitiesAreCapped) {
   EXPECT_NEAR(fastest, 0.004, 1e-12);
 }
 
+// A small sphere whose every vertex has one of the big sphere's within 2 dx, in a stream: with a spring of no
+// stiffness nothing acts on it; without the rule the stream does.
+TEST(PaperCoupling, AForeignParticleInTheKernelTakesTheFluidsPlace) {
+  data::Scene scene = scene_of(Scheme::paper);
+  data::Kind big, small;
+  for (data::Kind* kind : {&big, &small}) {
+    kind->law = data::Kind::Law::rigid, kind->shape.type = data::Shape::Type::sphere;
+    const double radius = kind == &big ? 2e-6 : 0.4e-6;
+    kind->shape.radii = {radius, radius, radius}, kind->subdivision = kind == &big ? 10 : 3;
+    kind->name = kind == &big ? "big" : "small";
+  }
+  scene.cells.kinds = {big, small};
+  scene.contact.stiffness = 0;
+  const auto speed = [&](data::Contact::Model model) {
+    scene.contact.model = model;
+    Simulation<double> sim(scene, {{0, {12, 14, 12}, mesh::identity_rotation, {}},
+                                   {1, {12, 18.95, 12}, mesh::identity_rotation, {}}});
+    for (int i = 0; i < 5; ++i) sim.step();
+    const auto v = std::get<rigid::RigidBodies<double>>(sim.groups()[1].cells).velocity(0);
+    return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  };
+  EXPECT_EQ(speed(data::Contact::Model::particle_in_kernel), 0);
+  EXPECT_GT(speed(data::Contact::Model::none), 1e-6);
+}
+
 /// Angle by which a marker on a small capsule in the middle of a shear flow went round, over half the strain:
 /// a sphere in free shear turns by exactly 1.
 double turn_over_half_strain(const data::Scene& scene, double strain) {
