@@ -8,13 +8,14 @@ namespace hemowalk::resolved {
 
 bool exterior_node(const mesh::Vec3& x, const mesh::Vec3& normal,
                    const std::function<bool(const Node3&)>& is_fluid, Node3& node) {
-  constexpr double equal = 1e-6;  // dx: lengths this close are the same
-  Node3 first;
+  constexpr double equal = 1e-6;            // dx: lengths this close are the same
+  std::array<std::array<int, 4>, 3> index;  // the farthest first
   std::array<std::array<double, 4>, 3> away, along;
   for (int d = 0; d < 3; ++d) {
-    first[d] = static_cast<int>(std::floor(x[d] - 0.5)) - 1;
+    const int first = static_cast<int>(std::floor(x[d] - 0.5)) - 1;
     for (int a = 0; a < 4; ++a) {
-      away[d][a] = first[d] + a + 0.5 - x[d];
+      index[d][a] = first + (normal[d] > 0 ? 3 - a : a);
+      away[d][a] = index[d][a] + 0.5 - x[d];
       along[d][a] = normal[d] * away[d][a];
     }
   }
@@ -27,7 +28,7 @@ bool exterior_node(const mesh::Vec3& x, const mesh::Vec3& normal,
         const double distance = away[0][a] * away[0][a] + away[1][b] * away[1][b] + away[2][c] * away[2][c];
         const bool better =
             !found || reach > farthest + equal || (reach > farthest - equal && distance < square - equal);
-        const Node3 candidate{first[0] + a, first[1] + b, first[2] + c};
+        const Node3 candidate{index[0][a], index[1][b], index[2][c]};
         if (!better || !is_fluid(candidate)) continue;
         farthest = reach, square = distance, node = candidate, found = true;
       }
