@@ -190,11 +190,58 @@ npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units)
 
 contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units) {
   contact::Law law;
-  law.range = units.length(scene.contact.range);
+  const bool by_kernel = scene.contact.model == data::Contact::Model::particle_in_kernel;
+  law.range = units.length(by_kernel ? data::Contact{}.range : scene.contact.range);
   law.stiffness = scene.contact.model == data::Contact::Model::none
                       ? 0
                       : units.stiffness_density(scene.contact.stiffness / reference_vertex_area);
   return law;
+}
+
+contact::KernelLaw make_kernel_contact(const data::Scene& scene, const LatticeUnits& units) {
+  using Kernel = data::Coupling::Kernel;
+  const Kernel kernel = scene.coupling.kernel;
+  return {kernel == Kernel::phi4   ? 2.0
+          : kernel == Kernel::phi3 ? 1.5
+                                   : 1.0,
+          units.length(scene.contact.range), units.modulus(scene.contact.stiffness)};
+}
+
+std::vector<std::string> coupling_problems(const data::Scene& scene) {
+  using Scheme = data::Coupling::Scheme;
+  const data::Coupling& c = scene.coupling;
+  std::vector<std::string> problems;
+  if (c.scheme != Scheme::paper && scene.contact.model == data::Contact::Model::particle_in_kernel)
+    problems.push_back(
+        "contact.model particle_in_kernel belongs to coupling.scheme paper (it takes the place of that "
+        "scheme's "
+        "fluid forces) use pairwise");
+  if (c.scheme == Scheme::conservative) return problems;
+  const std::string name = c.scheme == Scheme::paper ? "paper" : "peskin";
+  if (c.retraction != 0)
+    problems.push_back("coupling.retraction with coupling.scheme " + name +
+                       " (its markers are the vertices themselves) set retraction: 0");
+  if (scene.place.fluid != Place::host || scene.place.coupling != Place::host ||
+      scene.place.solid != Place::host)
+    problems.push_back("place: device with coupling.scheme " + name +
+                       " (the device's kernels know the conservative scheme only) use place: host");
+  if (c.scheme == Scheme::paper) return problems;
+  if (c.solid_every != 1)
+    problems.push_back("coupling.solid_every is " + std::to_string(c.solid_every) +
+                       " (coupling.scheme peskin moves membranes with the fluid, in every step) set it to 1");
+  for (const auto& kind : scene.cells.kinds) {
+    const std::string path = "cells.kinds." + kind.name;
+    if (kind.law == data::Kind::Law::rigid) {
+      problems.push_back(path +
+                         ".law is rigid (coupling.scheme peskin moves every vertex with the fluid) use law: "
+                         "paper with a high bending.modulus");
+    } else if (kind.kappa_damping > 0 || kind.rayleigh_beta > 0) {
+      problems.push_back(path +
+                         " is damped (coupling.scheme peskin has membranes without mass or drag) set "
+                         "kappa_damping and rayleigh_beta to 0");
+    }
+  }
+  return problems;
 }
 
 contact::Domain make_domain(const data::Scene& scene, const Block& block) {

@@ -1,9 +1,12 @@
 #pragma once
 /// \file From the words of a scene to the solver's structures, in lattice units.
 
+#include <string>
+#include <vector>
+
 #include "core/block.hpp"
 #include "core/data/scene.hpp"
-#include "resolved/contact/contact.hpp"
+#include "resolved/contact/kernel_contact.hpp"
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/mesh/mesh.hpp"
@@ -30,7 +33,11 @@ mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
                                         double retraction);
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);
+/// The pairwise law; of contact.model: particle_in_kernel the one it is packed with.
 contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units);
+contact::KernelLaw make_kernel_contact(const data::Scene& scene, const LatticeUnits& units);
+/// What of a scene its coupling.scheme cannot do, one text each.
+std::vector<std::string> coupling_problems(const data::Scene& scene);
 contact::Domain make_domain(const data::Scene& scene, const Block& block);
 
 }  // namespace hemowalk::resolved

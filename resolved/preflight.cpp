@@ -35,19 +35,13 @@ void check_available(const Scene& scene, std::vector<std::string>& problems) {
           "{:.4g} um or more",
           d, 1e6 * scene.domain.size[d], 1e6 * scene.domain.tube_diameter,
           1e6 * (scene.domain.tube_diameter + 4 * scene.fluid.dx)));
-  if (scene.coupling.scheme != data::Coupling::Scheme::conservative)
-    problems.push_back(
-        "coupling.scheme is not available in this version (only conservative is) use conservative");
+  for (auto& problem : coupling_problems(scene)) problems.push_back(std::move(problem));
   if (scene.coupling.scheme == data::Coupling::Scheme::conservative && scene.coupling.solid_every > 1 &&
       scene.coupling.retraction > 0)
     problems.push_back(
         "coupling.solid_every > 1 blows up with a retracted coupling surface (measured: "
         "docs/evidence/resolved.md) use "
         "solid_every: 1, or retraction: 0");
-  if (scene.contact.model == data::Contact::Model::particle_in_kernel)
-    problems.push_back(
-        "contact.model particle_in_kernel belongs to coupling.scheme paper (not available in this version) "
-        "use pairwise");
   if (const std::string problem = place_problem(scene); !problem.empty()) problems.push_back(problem);
 }
 
@@ -66,6 +60,12 @@ void check_flow(const Scene& scene, const LatticeUnits& units, std::vector<std::
                     scene.flow.type == data::Flow::Type::couette && scene.flow.walls == data::Flow::Walls::top
                         ? ", or let both walls move (flow.walls: both)"
                         : ""));
+  const auto& cap = scene.coupling.velocity_cap;
+  if (scene.coupling.scheme == data::Coupling::Scheme::paper && cap && speed > *cap)
+    problems.push_back(
+        fmt::format("coupling.velocity_cap is {:g} and the fastest flow {:.3g} lattice units per step (cells "
+                    "there could not follow it) raise the cap, or lower acceleration to {:.3g} or less",
+                    *cap, speed, scene.acceleration * *cap / speed));
   const double rate = scene.flow.type == data::Flow::Type::couette ? scene.flow.shear_rate : 0;
   const double reynolds = scene.acceleration * rate * std::pow(3.91e-6, 2) / scene.fluid.kinematic_viscosity;
   if (!scene.cells.kinds.empty() && reynolds > largest_capsule_reynolds)

@@ -18,7 +18,8 @@ double recovery_time(const data::Scene& scene, double acceleration, double limit
 
   data::Scene one;
   one.acceleration = acceleration;
-  one.fluid = scene.fluid, one.coupling = scene.coupling;
+  one.fluid = scene.fluid;
+  if (scene.coupling.scheme == data::Coupling::Scheme::conservative) one.coupling = scene.coupling;
   one.flow.type = data::Flow::Type::rest;
   one.domain.geometry = data::Domain::Geometry::periodic;
   one.contact.model = data::Contact::Model::none;

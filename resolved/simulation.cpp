@@ -11,26 +11,12 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
-#include "resolved/coupling.hpp"
-#include "resolved/mesh/vector.hpp"
 #include "resolved/region.hpp"
-#include "resolved/retraction.hpp"
-#include "resolved/slip_correction.hpp"
+#include "resolved/stopwatch.hpp"
 
 namespace hemowalk::resolved {
 
 namespace {
-
-/// Adds the wall time of a scope to one part.
-class Stopwatch {
- public:
-  explicit Stopwatch(double& part) : part_(part), start_(omp_get_wtime()) {}
-  ~Stopwatch() { part_ += omp_get_wtime() - start_; }
-
- private:
-  double& part_;
-  double start_;
-};
 
 std::array<double, 3>& operator+=(std::array<double, 3>& a, const std::array<double, 3>& b) {
   for (int d = 0; d < 3; ++d) a[d] += b[d];
@@ -75,10 +61,16 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
       fields_(decomposition_, fluid_.border_size()),
       any_cells_(!cells.empty()),
       h_(scene.coupling.solid_every),
+      scheme_(scene.coupling.scheme),
       one_theta_(scene.coupling.theta_n == scene.coupling.theta_t),
       velocity_(block_.size()),
       force_(block_.size()),
       handing_over_(decomposition_, Topic::cells) {
+  for (const std::string& problem : coupling_problems(scene)) throw InputError(problem);
+  require(
+      scheme_ == Scheme::conservative || this->ranks().count() == 1,
+      "coupling.scheme paper and peskin run on one rank (they read fields of the whole box) use one rank, "
+      "or conservative");
   build_groups(cells);
   find_loads(cells);
   build_coupling();
@@ -99,8 +91,7 @@ void Simulation<Real>::start_flow() {
     return lbm::FlowPoint{1, {0, 0, steady_velocity(scene_, units_, x, y)}};
   });
   fluid_.moments(velocity_.view());
-  ibm::fill_velocity_halo(block_, faces_, velocity_.view());  // no force yet: u* is what markers read
-  fields_.fill(velocity_.view());
+  fill_halo(velocity_.view());  // no force yet: u* is what markers read
 }
 
 template <class Real>
@@ -176,163 +167,29 @@ void Simulation<Real>::read_positions() {
         group.cells);
 }
 
-/// Retraction as a change of coordinates (docs/adr/0008): the coupling point x_s = x - delta n(x) is a
-/// function of the vertices, so its velocity is v - delta dn/dt, and a force J at x_s acts on the vertices as
-/// J and, through -delta (dn/dx)^T, as forces on the corners of the triangles around. Virtual work and both
-/// momenta are then conserved, and a rigid rotation of fluid and cell together feels no force. dn/dt and J
-/// are those of the last step.
 template <class Real>
-void Simulation<Real>::retract() {
-  const Real delta = static_cast<Real>(scene_.coupling.retraction);
-  if (delta == 0) return;
-  for (auto& group : groups_)
-    std::visit(
-        [&](const auto& g) {
-          constexpr int lanes = std::decay_t<decltype(g)>::lanes;
-          const auto& triangles = g.rest().triangles;
-          const int vertices = g.vertices();
-          const std::size_t length = static_cast<std::size_t>(vertices) * 3 * lanes;
-#pragma omp parallel for schedule(static)
-          for (int b = 0; b < g.batches(); ++b) {
-            const Real *x = g.offsets().data + b * length, *v = g.velocities().data + b * length;
-            Real* rate = normal_rate_.data() + 3 * static_cast<std::size_t>(group.first_marker) + b * length;
-            Real* force =
-                couple_force_.data() + 3 * static_cast<std::size_t>(group.first_marker) + b * length;
-            Real* sum = scratch_.data() + static_cast<std::size_t>(omp_get_thread_num()) * scratch_stride_;
-            std::fill(rate, rate + length, Real(0));
-            std::fill(force, force + length, Real(0));
-            if constexpr (requires { g.held(); })
-              continue;  // rigid bodies move their coupling points themselves
-            std::fill(sum, sum + length, Real(0));
-            for (const auto& t : triangles) add_normals<lanes>(t, x, v, sum, rate);
-            const Node4<Real>* J =
-                impulse_.data() + group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
-            for (int k = 0; k < vertices; ++k)
-              to_unit_normal<lanes>(delta, J + k * lanes, sum + 3 * k * lanes, rate + 3 * k * lanes);
-            for (const auto& t : triangles) add_couples<lanes>(t, x, sum, force);
-          }
-        },
-        group.cells);
-}
-
-/// Slip-corrected fluid velocity w at every vertex and v_pred = (m v^n + k a w + h F)/(m + k a) (method 5.2,
-/// 2-3).
-template <class Real>
-void Simulation<Real>::predict() {
-  const SlipCorrection<Real> correct{static_cast<Real>(scene_.coupling.theta_n),
-                                     static_cast<Real>(scene_.coupling.theta_t)};
-  const auto gravity = half_body_force();
-  const Real g[3] = {static_cast<Real>(gravity[0]), static_cast<Real>(gravity[1]),
-                     static_cast<Real>(gravity[2])};
-  const Real h = static_cast<Real>(h_);
-  for (auto& group : groups_)
-    std::visit(
-        [&](auto& cells) {
-          constexpr int lanes = std::decay_t<decltype(cells)>::lanes;
-          const Real *velocities = cells.velocities().data, *normals = cells.normals().data;
-          Real* predicted = cells.predicted().data;
-          const int vertices = cells.vertices();
-          if constexpr (requires { cells.held(); }) {
-            // v_pred belongs to the coupling points: what a force at the surface turns beyond them is a
-            // couple.
-            const auto at = cells.layout();
-#pragma omp parallel for schedule(static)
-            for (int c = 0; c < cells.count(); ++c)
-              for (int k = 0; k < vertices; ++k) {
-                const Node4<Real> F = contact_force_[group.marker(c, k)];
-                mesh::Vec3 arm;
-                for (int d = 0; d < 3; ++d)
-                  arm[d] = cells.offsets()[at.at(c, k, d)] - cells.held()[at.at(c, k, d)];
-                cells.add_couple(c, mesh::cross(arm, mesh::Vec3{F.x, F.y, F.z}));
-              }
-          }
-#pragma omp parallel for schedule(static)
-          for (int b = 0; b < cells.batches(); ++b)
-            for (int k = 0; k < vertices; ++k) {
-              const std::size_t scalar = (static_cast<std::size_t>(b) * vertices + k) * lanes,
-                                vector = 3 * scalar;
-              const std::size_t slot = group.first_marker + scalar;
-              const Real m = static_cast<Real>(group.mass[k]), a = static_cast<Real>(group.weight[k]),
-                         inverse_a = 1 / a;
-              const Real inverse_metric = static_cast<Real>(1 / (group.mass[k] + h_ * group.weight[k]));
-              for (int l = 0; l < lanes; ++l) {
-                Node4<Real>& u = reading_[slot + l];
-                const Node4<Real> F = contact_force_[slot + l];
-                const Real read[3] = {u.x, u.y, u.z};
-                const Real J[3] = {impulse_[slot + l].x, impulse_[slot + l].y, impulse_[slot + l].z};
-                Real w[3];
-                if (one_theta_) {
-                  correct.combined(read, J, inverse_a, w);
-                } else {
-                  const Node4<Real> f = force_reading_[slot + l];
-                  const Real half[3] = {f.x / 2, f.y / 2, f.z / 2};
-                  const Real normal[3] = {normals[vector + l], normals[vector + lanes + l],
-                                          normals[vector + 2 * lanes + l]};
-                  correct(read, half, J, inverse_a, normal, w);
-                }
-                const std::size_t at = 3 * static_cast<std::size_t>(group.first_marker) + vector + l;
-                for (int d = 0; d < 3; ++d) w[d] += g[d] + normal_rate_[at + d * lanes];
-                u = {w[0], w[1], w[2], Real(0)};
-                const Vector<Real> force{F.x + couple_force_[at], F.y + couple_force_[at + lanes],
-                                         F.z + couple_force_[at + 2 * lanes]};
-                const Vector<Real> v{velocities[vector + l], velocities[vector + lanes + l],
-                                     velocities[vector + 2 * lanes + l]};
-                const Vector<Real> next =
-                    predicted_velocity(Vector<Real>{w[0], w[1], w[2]}, v, force, m, h, inverse_metric);
-                predicted[vector + l] = next.x, predicted[vector + lanes + l] = next.y,
-                                   predicted[vector + 2 * lanes + l] = next.z;
-              }
-            }
-        },
-        group.cells);
+void Simulation<Real>::check_finite(const Group<Real>& group, const mesh::StepReport& report) const {
+  if (report.bad_cell < 0) return;
+  const auto id = std::visit([&](const auto& g) { return g.id(report.bad_cell); }, group.cells);
+  throw PhysicsError("cell " + std::to_string(id) + " (" + scene_.cells.kinds[group.kind].name +
+                     ") is no longer finite at step " + std::to_string(fluid_steps_) +
+                     " (blow-up) lower the acceleration or raise coupling.iterations");
 }
 
 template <class Real>
 void Simulation<Real>::move_cells() {
   mesh::StepOptions options;
   options.iterations = scene_.coupling.iterations;
+  if (scheme_ == Scheme::paper && scene_.coupling.velocity_cap)
+    options.velocity_cap = *scene_.coupling.velocity_cap;
   solid_report_ = {};
   const auto reports = solid_.step ? solid_.step(options) : std::vector<mesh::StepReport>{};
   for (auto& group : groups_) {
     const auto report = solid_.step ? reports[static_cast<std::size_t>(&group - groups_.data())]
                                     : std::visit([&](auto& g) { return g.step(options); }, group.cells);
-    if (report.bad_cell >= 0) {
-      const auto id = std::visit([&](const auto& g) { return g.id(report.bad_cell); }, group.cells);
-      throw PhysicsError("cell " + std::to_string(id) + " (" + scene_.cells.kinds[group.kind].name +
-                         ") is no longer finite at step " + std::to_string(fluid_steps_) +
-                         " (blow-up) lower the acceleration or raise coupling.iterations");
-    }
+    check_finite(group, report);
     solid_report_.increment = std::max(solid_report_.increment, report.increment);
   }
-}
-
-/// J = a (v - w): what each marker gives the fluid in each of the k fluid steps.
-template <class Real>
-void Simulation<Real>::impulses() {
-  for (auto& group : groups_)
-    std::visit(
-        [&](const auto& cells) {
-          constexpr int lanes = std::decay_t<decltype(cells)>::lanes;
-          const Real* velocities = cells.velocities().data;
-          const int vertices = cells.vertices();
-#pragma omp parallel for schedule(static)
-          for (int b = 0; b < cells.batches(); ++b)
-            for (int k = 0; k < vertices; ++k) {
-              const std::size_t scalar = (static_cast<std::size_t>(b) * vertices + k) * lanes;
-              const std::size_t slot = group.first_marker + scalar;
-              const Real a = static_cast<Real>(group.weight[k]);
-              const Real* v = velocities + 3 * scalar;
-              const int used = std::min(lanes, cells.count() - b * lanes);
-              for (int l = 0; l < lanes; ++l) {
-                const Node4<Real> w = reading_[slot + l];
-                const Node4<Real> none{0, 0, 0, 0};  // idle lanes give nothing
-                const Vector<Real> J = marker_impulse(a, Vector<Real>{v[l], v[lanes + l], v[2 * lanes + l]},
-                                                      Vector<Real>{w.x, w.y, w.z});
-                impulse_[slot + l] = l < used ? Node4<Real>{J.x, J.y, J.z, 0} : none;
-              }
-            }
-        },
-        group.cells);
 }
 
 /// Positions of the own cells to the neighbours, theirs to here; markers and bodies anew where the lists
@@ -354,8 +211,14 @@ void Simulation<Real>::share_positions() {
     fit_arrays();
     markers_->assign(copies_->body_of());
   }
-  if (change.bodies && contact_) contact_->set_bodies(copies_->bodies());
+  if (change.bodies) set_contact_bodies();
   copies_->place(origin_.view(), vertices_.view(), sites_.view());
+}
+
+template <class Real>
+void Simulation<Real>::set_contact_bodies() {
+  if (contact_) contact_->set_bodies(copies_->bodies());
+  if (paper_ && paper_->contact) paper_->contact->set_bodies(copies_->bodies());
 }
 
 /// Readings of a field at all own markers, wherever they lie.
@@ -372,6 +235,9 @@ template <class Real>
 void Simulation<Real>::press() {
   if (contact_) {
     contact_summary_ = contact_->compute(origin_.view(), vertices_.view(), contact_force_.view());
+  } else if (paper_ && paper_->contact) {
+    contact_summary_ = paper_->contact->compute(origin_.view(), vertices_.view(), paper_->normal.view(),
+                                                contact_force_.view());
   } else if (!loads_.empty()) {
     std::memset(static_cast<void*>(contact_force_.data()), 0, contact_force_.size() * sizeof(Node4<Real>));
   }
@@ -384,9 +250,10 @@ void Simulation<Real>::press() {
   }
 }
 
-/// Impulses of all markers that lie here, and of what falls into halo and walls.
+/// Impulses of all markers that lie here, and of what falls into halo and walls; walls and static solid take
+/// their shares in so many fluid \p steps.
 template <class Real>
-void Simulation<Real>::spread() {
+void Simulation<Real>::spread(double steps) {
   {
     Stopwatch watch(timings_.spreading);
 #pragma omp parallel for schedule(static)
@@ -406,92 +273,59 @@ void Simulation<Real>::spread() {
   }
   Stopwatch watch(timings_.spreading);
   force_on_walls_ = ibm::fold_force_halo(block_, faces_, force_.view());
-  take_force_from_solid();
+  take_force_from_solid(steps);
   force_on_walls_[0] += contact_summary_.wall_force[0], force_on_walls_[1] += contact_summary_.wall_force[1];
   for (int d = 0; d < 3; ++d) {
-    taken_.to_lower_wall[d] += h_ * force_on_walls_[0][d];
-    taken_.to_upper_wall[d] += h_ * force_on_walls_[1][d];
+    taken_.to_lower_wall[d] += steps * force_on_walls_[0][d];
+    taken_.to_upper_wall[d] += steps * force_on_walls_[1][d];
   }
 }
 
 /// What was spread on static solid is the solid's impulse, and no force on the fluid: the adjoint of reading
 /// zero velocity there.
 template <class Real>
-void Simulation<Real>::take_force_from_solid() {
+void Simulation<Real>::take_force_from_solid(double steps) {
   for (const std::size_t n : solid_nodes_) {
     Node4<Real>& f = force_[n];
-    taken_.to_solid[0] += h_ * f.x, taken_.to_solid[1] += h_ * f.y, taken_.to_solid[2] += h_ * f.z;
+    taken_.to_solid[0] += steps * f.x, taken_.to_solid[1] += steps * f.y, taken_.to_solid[2] += steps * f.z;
     f = {0, 0, 0, 0};
   }
 }
 
+/// Where all cells and markers are.
 template <class Real>
-void Simulation<Real>::step(EnergyBudget* budget) {
-  const double start = omp_get_wtime(), before = timings_.accounted();
-  if (budget) open_budget(*budget);
-  if (any_cells_) {
-    {
-      Stopwatch watch(timings_.communication);
-      hand_over();
-    }
-    {
-      Stopwatch watch(timings_.interpolation);
-      read_positions();
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      share_positions();
-    }
-    {
-      Stopwatch watch(timings_.interpolation);
-      markers_->locate(origin_.view(), sites_.view());
-      markers_->interpolate(velocity_.view(), reading_.view());
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      copies_->send_readings(reading_.view());
-    }
-    {
-      Stopwatch watch(timings_.contact);
-      press();
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      copies_->receive_readings(reading_.view());
-    }
-    if (!one_theta_) {
-      ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, faces_.periodic_z, {}, {}}, force_.view());
-      fields_.fill(force_.view());
-      read_field(force_.view(), force_reading_.view());
-    }
-    {
-      Stopwatch watch(timings_.solid);
-      retract();
-      predict();
-      move_cells();
-      impulses();
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      copies_->send_impulses(impulse_.view());
-    }
-    spread();
+void Simulation<Real>::find_cells() {
+  {
+    Stopwatch watch(timings_.communication);
+    hand_over();
   }
-  const View<const Node4<Real>> force =
-      any_cells_ ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
-  for (int k = 0; k < scene_.coupling.solid_every; ++k) {
-    const Real share = k + 1 == scene_.coupling.solid_every ? velocity_share() : Real(0);
-    if (budget) count_fluid(*budget, force, k == 0);
-    {
-      Stopwatch watch(timings_.fluid);
-      fluid_.begin_advance(force, velocity_.view(), share);
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      fields_.stream(fluid_);
-    }
+  {
+    Stopwatch watch(timings_.interpolation);
+    read_positions();
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    share_positions();
+  }
+  Stopwatch watch(timings_.interpolation);
+  markers_->locate(origin_.view(), sites_.view());
+}
+
+/// One fluid step with the present force; velocities of the new state for interpolation.
+template <class Real>
+void Simulation<Real>::advance_fluid(Real force_share) {
+  const View<const Node4<Real>> force = present_force();
+  {
     Stopwatch watch(timings_.fluid);
-    fluid_.end_advance(force, velocity_.view(), share);
+    fluid_.begin_advance(force, velocity_.view(), force_share);
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    fields_.stream(fluid_);
+  }
+  {
+    Stopwatch watch(timings_.fluid);
+    fluid_.end_advance(force, velocity_.view(), force_share);
     const auto impulse = fluid_.wall_impulse();
     taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
     taken_.to_solid += impulse.solid;
@@ -499,13 +333,43 @@ void Simulation<Real>::step(EnergyBudget* budget) {
       taken_.from_body_force[d] +=
           fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
   }
+  fill_halo(velocity_.view());
+}
+
+/// The halo of a velocity field: images, walls, other ranks.
+template <class Real>
+void Simulation<Real>::fill_halo(View<Node4<Real>> velocity) {
   {
     Stopwatch watch(timings_.fluid);
-    ibm::fill_velocity_halo(block_, faces_, velocity_.view());
+    ibm::fill_velocity_halo(block_, faces_, velocity);
   }
-  {
-    Stopwatch watch(timings_.communication);
-    fields_.fill(velocity_.view());
+  Stopwatch watch(timings_.communication);
+  fields_.fill(velocity);
+}
+
+template <class Real>
+void Simulation<Real>::step(EnergyBudget* budget) {
+  const double start = omp_get_wtime(), before = timings_.accounted();
+  if (scheme_ != Scheme::conservative) budget = nullptr;  // the others are not booked
+  if (budget) open_budget(*budget);
+  if (any_cells_) {
+    find_cells();
+    switch (scheme_) {
+      case Scheme::conservative:
+        couple_conservative();
+        break;
+      case Scheme::paper:
+        couple_paper();
+        break;
+      case Scheme::peskin:
+        couple_peskin();
+        break;
+    }
+  }
+  for (int k = 0; k < scene_.coupling.solid_every; ++k) {
+    if (any_cells_ && scheme_ == Scheme::paper) drive_fluid(k);  // its force is renewed in every fluid step
+    if (budget) count_fluid(*budget, present_force(), k == 0);
+    advance_fluid(k + 1 == scene_.coupling.solid_every ? velocity_share() : Real(0));
   }
   if (budget) close_budget(*budget);
   fluid_steps_ += scene_.coupling.solid_every;
@@ -566,7 +430,7 @@ double Simulation<Real>::slip_rms() {
   ibm::fill_velocity_halo(block_, {true, faces_.periodic_y, faces_.periodic_z, {}, {}}, field.view());
   fields_.fill(field.view());
   read_field(field.view(), f.view());
-  const double rest = 0.5 * (1 - (one_theta_ ? scene_.coupling.theta_n : 0));
+  const double rest = 0.5 - static_cast<double>(velocity_share());
   const auto gravity = half_body_force();
   double sums[2] = {0, 0};  // of squares, of markers
   for (const auto& group : groups_)

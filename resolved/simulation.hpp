@@ -1,6 +1,6 @@
 #pragma once
 /// \file Simulation: fluid, membranes, rigid bodies, coupling and contact together, in lattice units.
-/// step() is the method, line by line (coupling: conservative). Nothing here knows about files or SI units.
+/// step() is the method, line by line. Nothing here knows about files or SI units.
 ///
 /// On several ranks each holds a slab of the fluid and the cells with their centre in it (decomposition.hpp,
 /// copies.hpp). Calls marked (all) must then be made by all ranks.
@@ -18,6 +18,7 @@
 #include "core/data/scene.hpp"
 #include "core/mpi.hpp"
 #include "resolved/contact/contact.hpp"
+#include "resolved/contact/kernel_contact.hpp"
 #include "resolved/copies.hpp"
 #include "resolved/decomposition.hpp"
 #include "resolved/energy.hpp"
@@ -25,6 +26,7 @@
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
 #include "resolved/rigid/rigid.hpp"
+#include "resolved/surface_traction.hpp"
 #include "resolved/units.hpp"
 
 namespace hemowalk::resolved {
@@ -44,8 +46,8 @@ struct Group {
   int kind = 0;                    ///< index into Scene::cells.kinds
   std::int32_t first_body = 0;     ///< body number of its first cell
   std::uint32_t first_marker = 0;  ///< of vertex k of cell c: first_marker + layout().at(c, k)
-  std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid
-  std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx
+  std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid (paper: whole; peskin: none)
+  std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx (paper, peskin: A_k)
 
   int count() const {
     return std::visit([](const auto& g) { return g.count(); }, cells);
@@ -158,25 +160,46 @@ class Simulation {
   void arrange();
   void fit_arrays();
   void start_flow();
+  void find_cells();
   void read_positions();
   void share_positions();
+  void set_contact_bodies();
   void read_field(View<const Node4<Real>> field, View<Node4<Real>> reading);
+  void fill_halo(View<Node4<Real>> velocity);
   void press();
+  void move_cells();
+  void check_finite(const Group<Real>& group, const mesh::StepReport& report) const;
+  void spread(double steps);
+  void take_force_from_solid(double steps);
+  /// Of the markers on the fluid; none without cells.
+  View<const Node4<Real>> present_force() const {
+    return any_cells_ ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
+  }
+  void advance_fluid(Real force_share);
+  void hand_over();
+  // The three couplings, coupling_*.cpp: cells move by h_, the fluid gets force_ (docs/adr/0011).
+  void couple_conservative();
   void retract();
   void predict();
-  void move_cells();
   void impulses();
-  void spread();
-  void take_force_from_solid();
-  void hand_over();
   void open_budget(EnergyBudget& budget) const;
   void count_fluid(EnergyBudget& budget, View<const Node4<Real>> force, bool first) const;
   void close_budget(EnergyBudget& budget);
   double wall_work() const;
   double kinetic_energy() const;
+  void couple_paper();
+  void read_normals();
+  void fluid_forces();
+  void drive_fluid(int fluid_step);
+  void read_momentum(bool with_force);
+  void couple_peskin();
+  void membrane_forces();
+  void add_half_force();
+  void follow_fluid();
   /// Interpolation reads u* + this share of F where one theta serves both directions.
   Real velocity_share() const {
-    return one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n) : Real(0);
+    return scheme_ == Scheme::conservative && one_theta_ ? static_cast<Real>(0.5 * scene_.coupling.theta_n)
+                                                         : Real(0);
   }
   lbm::Vec3 half_body_force() const;
 
@@ -190,12 +213,21 @@ class Simulation {
   std::vector<Group<Real>> groups_;
   bool any_cells_ = false;  ///< on any rank
   std::size_t bodies_ = 0, slots_ = 0;
-  double h_ = 1;           ///< solid time step in fluid steps
+  double h_ = 1;  ///< solid time step in fluid steps
+  using Scheme = data::Coupling::Scheme;
+  Scheme scheme_ = Scheme::conservative;
   bool one_theta_ = true;  ///< theta_n == theta_t: one field carries velocity and correction
 
   std::unique_ptr<ibm::Markers<Real>> markers_;
   std::unique_ptr<contact::Contact<Real>> contact_;
   std::unique_ptr<Copies<Real>> copies_;
+  struct Paper {  ///< what coupling: paper keeps beside the rest
+    std::unique_ptr<contact::KernelContact<Real>> contact;
+    std::vector<OneRings> rings;  ///< [group]
+    Array<Node4<Real>> normal;    ///< [slot]
+    Array<Node4<Real>> momentum;  ///< field with halo: rho u and rho - 1
+  };
+  std::unique_ptr<Paper> paper_;
   Array<Node4<Real>> velocity_, force_;  ///< fields with halo
   // Arrays of bodies and slots hold this rank's own, then the neighbours' copies; they never shrink.
   Array<ibm::Origin> origin_;                   ///< [body]

@@ -29,20 +29,33 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
     mesh::TriangleMesh held = rest;
     if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling.retraction);
     const std::vector<double> area = mesh::vertex_areas(held);
-    const double excess = (k.density / units_.density - 1) * mesh::volume(rest) / rest.vertex_count();
-    std::vector<double> mass(area.size(), excess), weight(area.size()), metric(area.size());
+    const double density = k.density / units_.density,
+                 displaced =
+                     mesh::volume(rest) / rest.vertex_count();  // mass of the plasma in a cell, per vertex
+    std::vector<double> mass(area.size(), (density - 1) * displaced), weight = area, metric(area.size());
     for (std::size_t v = 0; v < area.size(); ++v) {
-      weight[v] = scene_.coupling.chi * area[v];
-      metric[v] = mass[v] + steps * weight[v];
+      switch (scheme_) {
+        case Scheme::conservative:
+          weight[v] = scene_.coupling.chi * area[v];
+          metric[v] = mass[v] + steps * weight[v];
+          break;
+        case Scheme::paper:
+          metric[v] = mass[v] = density * displaced;
+          break;
+        case Scheme::peskin:
+          mass[v] = 0, metric[v] = displaced;  // the metric of a step that is never taken
+          break;
+      }
       require(
           metric[v] > 0,
           "cells.kinds." + k.name +
               ".density is too low (the implicit mass of a vertex is not positive) raise it or coupling.chi");
     }
+    npfem::Material material = make_material(k, units_);
+    material.damp_after = scheme_ == Scheme::paper;
     auto make = [&]() -> std::variant<npfem::Membranes<Real>, rigid::RigidBodies<Real>> {
       if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_, held.vertices});
-      return npfem::Membranes<Real>(
-          std::make_shared<npfem::CellType>(rest, make_material(k, units_), metric, h_));
+      return npfem::Membranes<Real>(std::make_shared<npfem::CellType>(rest, material, metric, h_));
     };
     Group<Real> group{make(), kind, 0, 0, mass, weight};
     for (std::size_t c = 0; c < cells.size(); ++c) {
@@ -108,7 +121,17 @@ void Simulation<Real>::build_coupling() {
         group.cells);
   scratch_ = Array<Real>(scratch_stride_ * omp_get_max_threads());
   const contact::Law law = make_contact(scene_, units_);
-  const bool in_contact = law.stiffness > 0 && any_cells_;
+  const bool by_kernel = scene_.contact.model == data::Contact::Model::particle_in_kernel;
+  const bool in_contact = law.stiffness > 0 && any_cells_ && !by_kernel;
+  if (scheme_ == Scheme::paper) {
+    paper_ = std::make_unique<Paper>();
+    paper_->momentum = Array<Node4<Real>>(block_.size());
+    for (const auto& group : groups_)
+      paper_->rings.emplace_back(std::visit([](const auto& g) { return g.rest(); }, group.cells));
+    if (by_kernel)
+      paper_->contact = std::make_unique<contact::KernelContact<Real>>(make_kernel_contact(scene_, units_),
+                                                                       make_domain(scene_, block_), vertices);
+  }
   copies_ = std::make_unique<Copies<Real>>(decomposition_, in_contact ? law.range : -1, vertices);
   if (in_contact) {
     contact::Domain domain = make_domain(scene_, block_);
@@ -164,6 +187,7 @@ void Simulation<Real>::fit_arrays() {
   for (auto* field : {&vertices_, &sites_, &reading_, &impulse_, &contact_force_}) fit(*field, slots);
   fit(normal_rate_, 3 * slots_), fit(couple_force_, 3 * slots_);
   if (!one_theta_) fit(force_reading_, slots);
+  if (paper_) fit(paper_->normal, slots);
 }
 
 namespace {

@@ -156,14 +156,11 @@ void Simulation<Real>::load(View<const std::byte> state) {
   fit_arrays();
   markers_->assign(copies_->body_of());
   markers_->load({part.sort.data(), part.sort.size()});
-  if (contact_) {
-    contact_->set_bodies(copies_->bodies());
-    contact_->load({part.contacts.data(), part.contacts.size()});
-  }
+  set_contact_bodies();
+  if (contact_) contact_->load({part.contacts.data(), part.contacts.size()});
   if (fluid_.border_missing()) fields_.stream(fluid_);
   fluid_.moments(velocity_.view(), any_cells_ ? force() : View<const Node4<Real>>{}, velocity_share());
-  ibm::fill_velocity_halo(block_, faces_, velocity_.view());
-  fields_.fill(velocity_.view());
+  fill_halo(velocity_.view());
 }
 
 template <class Real>

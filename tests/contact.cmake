@@ -3,7 +3,7 @@ if(NOT TARGET hemowalk_contact OR NOT TARGET hemowalk_mesh)
 endif()
 
 hemowalk_test(test_contact
-  SOURCES unit/test_contact_geometry.cpp unit/test_contact_forces.cpp verification/test_contact_spheres.cpp
+  SOURCES unit/test_contact_geometry.cpp unit/test_contact_forces.cpp unit/test_kernel_contact.cpp verification/test_contact_spheres.cpp
   LINK hemowalk_contact hemowalk_mesh LABELS unit verification)
 
 find_package(benchmark QUIET)

@@ -4,6 +4,8 @@ if(TARGET hemowalk_resolved)
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
             verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp
     LINK hemowalk_resolved LABELS unit verification)
+  hemowalk_test(test_couplings
+    SOURCES unit/test_surface_traction.cpp verification/test_resolved_couplings.cpp LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
   add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)
   target_link_libraries(test_resolved_ranks PRIVATE hemowalk_resolved GTest::gtest)

@@ -78,9 +78,10 @@ std::string physics_hash(Value root) {
 
 Vec3 vec3(const Value& v) { return {v["0"].number(), v["1"].number(), v["2"].number()}; }
 
+/// The number at \p path; nothing where there is none, or a word such as `off`.
 std::optional<double> maybe(const Value& v, const std::string& path) {
   const Value* found = v.find(path);
-  return found ? std::optional(found->number()) : std::nullopt;
+  return found && found->type == Value::Type::number ? std::optional(found->number()) : std::nullopt;
 }
 
 Kind kind_of(const std::string& name, const Value& v) {
@@ -172,7 +173,8 @@ Coupling coupling_of(const Value& v) {
   c.theta_n = v["theta.0"].number();
   c.theta_t = v["theta.1"].number();
   c.chi = v["chi"].number();
-  if (v["velocity_cap"].type == Value::Type::number) c.velocity_cap = v["velocity_cap"].number();
+  c.velocity_cap = maybe(v, "velocity_cap");
+  c.force_cap = maybe(v, "force_cap");
   c.median_filter = v["median_filter"].boolean();
   c.iterations = static_cast<int>(v["iterations"].integer());
   return c;

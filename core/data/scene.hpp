@@ -53,14 +53,15 @@ struct Coupling {
   double theta_n = 0.97, theta_t = 0.97;  ///< slip correction, normal and tangential
   double chi = 8.0 / 3.0;
   std::optional<double> velocity_cap;  ///< lattice units
+  std::optional<double> force_cap;     ///< N, peskin
   bool median_filter = false;
   int iterations = 1;  ///< solid iterations per coupling step (conservative)
 };
 
 struct Contact {
   enum class Model { pairwise, particle_in_kernel, none } model = Model::pairwise;
-  double range = 0.5e-6;     ///< m
-  double stiffness = 20e-6;  ///< N/m, per vertex at zero gap
+  double range = 0.5e-6;     ///< m; particle_in_kernel: of the point pulled to, from the neighbour
+  double stiffness = 20e-6;  ///< N/m, per vertex (pairwise: at zero gap)
 };
 
 struct Shape {

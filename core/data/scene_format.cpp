@@ -68,7 +68,8 @@ Field fluid() {
 
 /// Defaults of `scheme: paper` are those of the paper, where they differ.
 Field coupling() {
-  const std::vector<std::string> ours{"conservative", "peskin"}, paper{"paper"};
+  const std::vector<std::string> conservative{"conservative"}, paper{"paper"}, peskin{"peskin"},
+      ours{"conservative", "peskin"}, others{"paper", "peskin"};
   const Field every = integer().at_least(1).at_most(1000), shift = number().at_least(0).at_most(2);
   const Coupling usual;  // numbers found by calibration stand in one place, the struct
   const Field cap = any_of({choice({"off"}), number().above(0).at_most(0.5)});
@@ -81,9 +82,9 @@ Field coupling() {
       with_default("solid_every", every, "2", "fluid steps per solid step").when("scheme", paper),
       with_default("retraction", shift, format_number(usual.retraction),
                    "distance of the coupling surface inside the membrane, in dx")
-          .when("scheme", ours),
+          .when("scheme", conservative),
       with_default("retraction", shift, "0", "distance of the coupling surface inside the membrane, in dx")
-          .when("scheme", paper),
+          .when("scheme", others),
       with_default("theta", list_of(number().at_least(0).at_most(1), 2, 2),
                    "[" + format_number(usual.theta_n) + ", " + format_number(usual.theta_t) + "]",
                    "slip correction, normal and tangential"),
@@ -93,12 +94,19 @@ Field coupling() {
           .when("scheme", ours),
       with_default("velocity_cap", cap, "0.03", "largest velocity handed to a vertex, lattice units")
           .when("scheme", paper),
+      with_default("force_cap", any_of({choice({"off"}), quantity("N", "pN").above(0)}), "off",
+                   "largest elastic force of a vertex on the fluid")
+          .when("scheme", peskin),
       with_default("median_filter", boolean(), "false", "one-ring median of the forces on the solid")
           .when("scheme", ours),
       with_default("median_filter", boolean(), "true", "one-ring median of the forces on the solid")
           .when("scheme", paper),
       with_default("iterations", integer().at_least(1).at_most(1000), "1",
-                   "solid iterations per coupling step"),
+                   "solid iterations per coupling step")
+          .when("scheme", ours),
+      with_default("iterations", integer().at_least(1).at_most(1000), "4",
+                   "solid iterations per coupling step")
+          .when("scheme", paper),
   });
 }
 
@@ -107,8 +115,11 @@ Field contact() {
       with_default("model", choice({"pairwise", "particle_in_kernel", "none"}), "pairwise",
                    "repulsion of close surfaces"),
       with_default("range", length().above(0), "0.5 um", "gap at which it starts")
-          .when("model", {"pairwise", "particle_in_kernel"}),
-      with_default("stiffness", tension(), "20 pN/um", "per vertex at zero gap")
+          .when("model", {"pairwise"}),
+      with_default("range", length().above(0), "1 um",
+                   "how far outside the neighbour the point lies that is pulled to")
+          .when("model", {"particle_in_kernel"}),
+      with_default("stiffness", tension(), "20 pN/um", "per vertex (pairwise: at zero gap)")
           .when("model", {"pairwise", "particle_in_kernel"}),
   });
 }

@@ -77,16 +77,19 @@ Node fluid(const Fluid& f) {
 }
 
 Node coupling(const Coupling& c) {
-  return yaml::map({{"scheme", word("coupling.scheme", c.scheme)},
-                    {"kernel", word("coupling.kernel", c.kernel)},
-                    {"cycles", whole(c.cycles)},
-                    {"solid_every", whole(c.solid_every)},
-                    {"retraction", value(c.retraction)},
-                    {"theta", list({value(c.theta_n), value(c.theta_t)})},
-                    {"chi", value(c.chi)},
-                    {"velocity_cap", c.velocity_cap ? value(*c.velocity_cap) : scalar("off")},
-                    {"median_filter", scalar(c.median_filter ? "true" : "false")},
-                    {"iterations", whole(c.iterations)}});
+  Members m{{"scheme", word("coupling.scheme", c.scheme)},
+            {"kernel", word("coupling.kernel", c.kernel)},
+            {"cycles", whole(c.cycles)},
+            {"solid_every", whole(c.solid_every)},
+            {"retraction", value(c.retraction)},
+            {"theta", list({value(c.theta_n), value(c.theta_t)})},
+            {"chi", value(c.chi)},
+            {"velocity_cap", c.velocity_cap ? value(*c.velocity_cap) : scalar("off")},
+            {"median_filter", scalar(c.median_filter ? "true" : "false")},
+            {"iterations", whole(c.iterations)}};
+  if (c.scheme == Coupling::Scheme::peskin)
+    m.emplace_back("force_cap", c.force_cap ? value(*c.force_cap, "N") : scalar("off"));
+  return yaml::map(std::move(m));
 }
 
 Node contact(const Contact& c) {

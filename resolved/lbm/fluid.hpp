@@ -81,6 +81,12 @@ struct EnergyFlows {
   double body_force = 0;  ///< work of the body force
 };
 
+/// State of stress of one node: sigma = -pressure + viscous.
+struct NodeStress {
+  double pressure = 0;              ///< (rho - 1)/3
+  std::array<double, 6> viscous{};  ///< xx, yy, zz, xy, xz, yz
+};
+
 /// Averages over the fluid nodes of each plane y = j + 1/2.
 struct PlanarProfiles {
   std::vector<Vec3> velocity;              ///< physical: u* + F/(2 rho)
@@ -160,6 +166,10 @@ class Fluid {
   EnergyFlows energy(View<const Node4<Real>> force) const;
   /// Profiles of the current state; \p force is the field that acts (or acted last), empty = body force only.
   PlanarProfiles profiles(View<const Node4<Real>> force) const;
+
+  /// Stress at a fluid node of the interior, from its populations: viscous = -(1 - 1/(2 tau)) Pi_neq, up to
+  /// O(F^2). A random access: some 0.1 us.
+  NodeStress stress(int i, int j, int k) const;
 
   /// Complete state, exact, independent of thread count and padding: a header, then the planes in order, so
   /// that the states of blocks divided along z can be cut and joined. load() wants the same block and Real.

@@ -280,6 +280,23 @@ PlanarProfiles Fluid<Real>::profiles(View<const Node4<Real>> force) const {
 }
 
 template <class Real>
+NodeStress Fluid<Real>::stress(int i, int j, int k) const {
+  double f[directions], density = 0, flux[3] = {}, second[6] = {};
+  populations(i, j, k, f);
+  constexpr int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
+  for (int d = 0; d < directions; ++d) {
+    density += f[d];
+    for (int a = 0; a < 3; ++a) flux[a] += c[d][a] * f[d];
+    for (int p = 0; p < 6; ++p) second[p] += c[d][pair[p][0]] * c[d][pair[p][1]] * f[d];
+  }
+  NodeStress result{density / 3, {}};
+  for (int p = 0; p < 6; ++p)
+    result.viscous[p] = -(1 - 0.5 / parameters_.tau) * (second[p] - (p < 3 ? density / 3 : 0) -
+                                                        flux[pair[p][0]] * flux[pair[p][1]] / (1 + density));
+  return result;
+}
+
+template <class Real>
 std::vector<std::byte> Fluid<Real>::save() const {
   StateHeader header;
   header.real_size = sizeof(Real);
@@ -376,6 +393,7 @@ std::size_t Fluid<Real>::memory_bytes() const {
   template Totals Fluid<Real>::totals() const;                                                         \
   template EnergyFlows Fluid<Real>::energy(View<const Node4<Real>>) const;                             \
   template PlanarProfiles Fluid<Real>::profiles(View<const Node4<Real>>) const;                        \
+  template NodeStress Fluid<Real>::stress(int, int, int) const;                                        \
   template std::vector<std::byte> Fluid<Real>::save() const;                                           \
   template void Fluid<Real>::load(View<const std::byte>);                                              \
   template std::size_t Fluid<Real>::memory_bytes() const;

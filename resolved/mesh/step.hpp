@@ -1,11 +1,14 @@
 #pragma once
 /// \file Settings and outcome of one solid step, common to all groups of cells.
 
+#include <limits>
+
 namespace hemowalk::mesh {
 
 struct StepOptions {
-  int iterations = 1;             ///< quasi-Newton iterations (membranes)
-  bool damping = true;            ///< kappa damping (membranes)
+  int iterations = 1;                                             ///< quasi-Newton iterations (membranes)
+  bool damping = true;                                            ///< kappa damping (membranes)
+  double velocity_cap = std::numeric_limits<double>::infinity();  ///< largest speed a vertex moves with
   bool measure_residual = false;  ///< one more force evaluation, fills StepReport::residual (membranes)
 };
 

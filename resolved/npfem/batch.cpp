@@ -1,6 +1,7 @@
 #include "resolved/npfem/batch.hpp"
 
 #include <cstring>
+#include <limits>
 
 namespace hemowalk::npfem {
 namespace {
@@ -30,6 +31,7 @@ Tables<Real>::Tables(const CellType& type)
       material(type.material()),
       metric(convert<Real>(type.metric())),
       kappa(convert<Real>(type.kappa())),
+      kappa_after(convert<Real>(type.kappa_after())),
       order(type.factor().order),
       row_begin(type.factor().row_begin),
       row_index(type.factor().row_index),
@@ -43,7 +45,8 @@ Tables<Real>::Tables(const CellType& type)
       rest_volume(static_cast<Real>(type.rest_volume())),
       rest_gradient_square(static_cast<Real>(type.rest_gradient_square())),
       epsilon2(static_cast<Real>(type.bending_epsilon() * type.bending_epsilon())),
-      damped(type.material().drag_per_area > 0) {
+      damped(type.material().drag_per_area > 0 && !type.material().damp_after),
+      damp_after(type.material().drag_per_area > 0 && type.material().damp_after) {
   const auto real = [](double x) { return static_cast<Real>(x); };
   double total = 0;
   for (int k = 0; k < vertices; ++k) {
@@ -335,6 +338,21 @@ template <class Real>
   return change / max(total, P(Real(1e-30)));
 }
 
+/// d <- d + kappa (h (V + omega x r) - d).
+template <class Real>
+[[gnu::flatten]] void BatchKernel<Real>::damp(const BatchFields<Real>& b, const Frame& frame) {
+  for (int k = 0; k < t_.vertices; ++k) {
+    const V d = load3(s_.increment.data(), k);
+    store3(d + t_.kappa_after[k] * (t_.h * frame.at(load3(b.offset, k)) - d), s_.increment.data(), k);
+  }
+}
+
+/// Velocities above \p limit are shortened to it.
+template <class Real>
+[[gnu::flatten]] void BatchKernel<Real>::cap(const BatchFields<Real>& b, Real limit) {
+  for (int k = 0; k < t_.vertices; ++k) store3(shortened(load3(b.velocity, k), limit), b.velocity, k);
+}
+
 /// v = d/h, with its rigid part replaced by that of v_pred: internal forces change neither the linear nor the
 /// angular momentum (about x^n), whether the iteration has converged or not.
 template <class Real>
@@ -432,8 +450,19 @@ auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions
     using std::max;
     report.residual = square / max(scale, P(Real(1e-30)));
   }
+  if (options.damping && t_.damp_after) damp(b, frame);
   project(b, frame);
+  if (options.velocity_cap < std::numeric_limits<double>::infinity())
+    cap(b, static_cast<Real>(options.velocity_cap));
   report.probe = move(b);
+  update_normals(b);
+  return report;
+}
+
+template <class Real>
+auto BatchKernel<Real>::drift(const BatchFields<Real>& b) -> Report {
+  std::memcpy(b.velocity, b.predicted, sizeof(Real) * 3 * Scratch<Real>::size(t_.vertices));
+  Report report{P(0), P(0), move(b)};
   update_normals(b);
   return report;
 }

@@ -54,6 +54,8 @@ class BatchKernel {
     P probe;                ///< not finite where any vertex is not
   };
   Report step(const BatchFields<Real>& b, const mesh::StepOptions& options);
+  /// A step of a body without mass or forces: v = v_pred, x += h v.
+  Report drift(const BatchFields<Real>& b);
   /// F_int at the present positions, into scratch.force.
   void forces(const BatchFields<Real>& b);
   /// -F_int.v per lane with F_int at x - h v/2, x the positions that the last step of h v led to: the rate at
@@ -99,7 +101,9 @@ class BatchKernel {
   void solve_with_volume();
   /// d += correction; \returns |correction|^2/|d|^2.
   P correct(const BatchFields<Real>& b);
+  void damp(const BatchFields<Real>& b, const Frame& frame);
   void project(const BatchFields<Real>& b, const Frame& frame);
+  void cap(const BatchFields<Real>& b, Real limit);
   P move(const BatchFields<Real>& b);
 
   const Tables<Real>& t_;

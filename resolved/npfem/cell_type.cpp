@@ -193,7 +193,9 @@ CellType::CellType(mesh::TriangleMesh rest, Material material, std::vector<doubl
   std::vector<Entry> matrix = laplacian_;
   for (auto& e : matrix) e.value *= stiffness_scale;
   for (int k = 0; k < n; ++k) {
-    kappa_.push_back(kappa_of(material_.drag_per_area, vertex_areas_[k], h_, metric_[k]));
+    const double kappa = kappa_of(material_.drag_per_area, vertex_areas_[k], h_, metric_[k]);
+    kappa_.push_back(material_.damp_after ? 0 : kappa);
+    kappa_after_.push_back(material_.damp_after ? kappa : 0);
     matrix.push_back({k, k, metric_[k] / (h_ * h_ * (1 - kappa_[k]))});  // m/h^2 + c/h
   }
   factor_ = factorise(n, matrix);

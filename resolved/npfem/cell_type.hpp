@@ -61,7 +61,9 @@ class CellType {
   };
   const std::vector<Entry>& laplacian() const { return laplacian_; }
   /// kappa of each vertex at this h and metric: kappa_k/(1 - kappa_k) = c_A A_k h/metric_k (method 3).
+  /// Zero with Material::damp_after: then it is kappa_after() that acts, on the solved velocity.
   const std::vector<double>& kappa() const { return kappa_; }
+  const std::vector<double>& kappa_after() const { return kappa_after_; }
 
  private:
   mesh::TriangleMesh rest_;
@@ -73,7 +75,7 @@ class CellType {
   std::vector<TriangleRest> triangle_rest_;
   std::vector<EdgeRest> edge_rest_;
   std::vector<Entry> laplacian_;
-  std::vector<double> kappa_;
+  std::vector<double> kappa_, kappa_after_;
   SparseFactor factor_;
   double rest_area_ = 0, rest_volume_ = 0, rest_gradient_square_ = 0, bounding_radius_ = 0;
   double bending_epsilon_ = 0;

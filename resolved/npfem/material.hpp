@@ -25,6 +25,9 @@ struct Material {
   double rayleigh_beta = 0;     ///< time; stiffness-proportional damping beta Lap v
   double drag_per_area = 0;     ///< c_A, mass/(time area): kappa damping as a drag on the non-rigid velocity
 
+  /// The paper's order: solve without the drag, damp the velocity, move by it (relaxation times depend on h).
+  bool damp_after = false;
+
   /// Small-strain shear modulus of the law: B/4 for the paper's law, else Gs.
   double shear_modulus() const { return law == Law::paper ? B / 4 : Gs; }
   /// Small-strain area dilation modulus.

@@ -95,6 +95,17 @@ struct Membranes<Real>::Impl {
             predicted.data() + at};
   }
 
+  /// body(kernel, b) for every batch, with a thread's own scratch.
+  template <class Body>
+  void for_batches(int n, const Body& body) {
+    add_scratch();  // nothing to do unless there are more threads than before
+#pragma omp parallel for schedule(static)
+    for (int b = 0; b < n; ++b) {
+      BatchKernel<Real> kernel(tables, scratch[omp_get_thread_num()]);
+      body(kernel, b);
+    }
+  }
+
   std::vector<Vec3> forces(int c) {
     BatchKernel<Real> kernel(tables, scratch[0]);
     kernel.forces(batch(c / lanes));
@@ -222,14 +233,25 @@ View<Real> Membranes<Real>::predicted() {
 
 template <class Real>
 StepReport Membranes<Real>::step(const StepOptions& options) {
-  impl_->add_scratch();  // nothing to do unless there are more threads than before
-  const int n = batches();
-#pragma omp parallel for schedule(static)
-  for (int b = 0; b < n; ++b) {
-    BatchKernel<Real> kernel(impl_->tables, impl_->scratch[omp_get_thread_num()]);
-    impl_->reports[b] = kernel.step(impl_->batch(b), options);
-  }
+  impl_->for_batches(batches(),
+                     [&](auto& kernel, int b) { impl_->reports[b] = kernel.step(impl_->batch(b), options); });
   return impl_->summary(count());
+}
+
+template <class Real>
+StepReport Membranes<Real>::drift() {
+  impl_->for_batches(batches(),
+                     [&](auto& kernel, int b) { impl_->reports[b] = kernel.drift(impl_->batch(b)); });
+  return impl_->summary(count());
+}
+
+template <class Real>
+void Membranes<Real>::internal_forces(View<Real> out) {
+  const std::size_t size = impl_->batch_size();
+  impl_->for_batches(batches(), [&](auto& kernel, int b) {
+    kernel.forces(impl_->batch(b));
+    std::memcpy(out.data + b * size, impl_->scratch[omp_get_thread_num()].force.data(), size * sizeof(Real));
+  });
 }
 
 template <class Real>

@@ -80,6 +80,10 @@ class Membranes {
 
   // --- membranes only ----------------------------------------------------------------------------------
   const CellType& type() const;
+  /// F_int of all cells at the present positions, laid out as predicted().
+  void internal_forces(View<Real> out);
+  /// Moves every cell by h predicted(), which becomes its velocity: membranes without mass.
+  StepReport drift();
   void set_positions(int c, const std::vector<mesh::Vec3>& x);
   void set_velocities(int c, const std::vector<mesh::Vec3>& v);
   /// F_int at the present positions by the fast path, for output and tests.

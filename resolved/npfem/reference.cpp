@@ -370,7 +370,10 @@ SolveReport step_implicit(const CellType& type, State& s, const Field& v_pred, d
     lbfgs.remember(step, y);
     d = trial, value = trial_value;
   }
-  for (std::size_t k = 0; k < d.size(); ++k) s.v[k] = mesh::scale(1 / h, d[k]);
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    s.v[k] = mesh::scale(1 / h, d[k]);
+    mesh::accumulate(s.v[k], type.kappa_after()[k], mesh::subtract(rigid[k], s.v[k]));
+  }
   if (project) {
     axpy(-1, rigid_part(type, s.x, s.v), s.v);
     axpy(1, rigid, s.v);

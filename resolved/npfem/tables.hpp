@@ -41,14 +41,15 @@ struct Tables {
   Material material;
   std::vector<TriangleRow> triangles;
   std::vector<EdgeRow> edges;
-  std::vector<Real> metric, mass_rate, kappa;  ///< m, m/(h^2 (1 - kappa)), kappa of every vertex
+  std::vector<Real> metric, mass_rate, kappa,
+      kappa_after;  ///< m, m/(h^2 (1 - kappa)), kappas of every vertex
   std::vector<int> order, row_begin, row_index, column_begin, column_index;  ///< SparseFactor
   std::vector<Real> row_value, column_value, inverse_diagonal;
   std::vector<int> lap_begin, lap_index;  ///< full rows of Lap (Rayleigh damping)
   std::vector<Real> lap_value;
   Real h, inverse_h, rest_volume, rest_gradient_square, epsilon2, total_metric;
-  bool damped;
-  bool stiff_volume;  ///< k_v exceeds half the mean mass rate: N needs the volume term to converge
+  bool damped, damp_after;  ///< kappa, kappa_after are not zero
+  bool stiff_volume;        ///< k_v exceeds half the mean mass rate: N needs the volume term to converge
 };
 
 }  // namespace hemowalk::npfem

@@ -1,5 +1,6 @@
 #include "resolved/rigid/rigid.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -121,7 +122,7 @@ struct RigidBodies<Real>::Impl {
     for (int d = 0; d < 3; ++d) anchor[layout().anchor(c, d)] = x[d];
   }
 
-  void step(int c) {
+  void step(int c, double velocity_cap) {
     const auto turn = mesh::matrix(orientation[c]);
     Vec3 linear{}, angular = mesh::scale(type.h, couple[c]);
     couple[c] = {};
@@ -135,7 +136,21 @@ struct RigidBodies<Real>::Impl {
     }
     velocity_of_centre[c] = mesh::scale(1 / shape.gyration.mass, linear);
     spin[c] = shape.gyration.spin_of(angular, turn);
+    cap(c, turn, velocity_cap);
     move(c, turn);
+  }
+
+  /// Slows the whole motion down until no held point is faster than \p limit.
+  void cap(int c, const Matrix3& turn, double limit) {
+    if (!std::isfinite(limit)) return;
+    double fastest = 0;
+    for (int k = 0; k < vertices; ++k)
+      fastest = std::max(
+          fastest,
+          mesh::norm(mesh::add(velocity_of_centre[c], cross(spin[c], mesh::transform(turn, shape.held[k])))));
+    if (fastest <= limit) return;
+    velocity_of_centre[c] = mesh::scale(limit / fastest, velocity_of_centre[c]);
+    spin[c] = mesh::scale(limit / fastest, spin[c]);
   }
 
   void move(int c, const Matrix3& turn) {
@@ -253,10 +268,10 @@ View<Real> RigidBodies<Real>::predicted() {
 }
 
 template <class Real>
-StepReport RigidBodies<Real>::step(const StepOptions&) {
+StepReport RigidBodies<Real>::step(const StepOptions& options) {
   const int n = count();
 #pragma omp parallel for schedule(static)
-  for (int c = 0; c < n; ++c) impl_->step(c);
+  for (int c = 0; c < n; ++c) impl_->step(c, options.velocity_cap);
   StepReport report;
   for (int c = 0; c < n && report.bad_cell < 0; ++c) {
     const auto x = impl_->anchor_of(c);

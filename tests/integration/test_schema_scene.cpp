@@ -185,7 +185,8 @@ TEST(SchemaScene, WritingAndReadingGivesTheSameScene) {
       {"cells.kinds.rbc={shape: {ellipsoid: {radii: [1 um, 2 um, 3 um]}}, law: {skalak: {Gs: 3 pN/um, C: "
        "50}}, bending: {model: helfrich, reference_curvature: -1 1/um}}"},
       {"cells.kinds.rbc={shape: sphere, radius: 3.91 um, law: neo_hookean, Gs: 4.2 pN/um}",
-       "coupling.scheme=peskin"},
+       "coupling.scheme=peskin", "coupling.force_cap=3 pN"},
+      {"coupling.scheme=peskin", "coupling.force_cap=off", "coupling.retraction=0"},
       {"coupling.scheme=paper", "coupling.velocity_cap=0.07", "time.checkpoint.every=7 ms",
        "seed=9007199254740993"}};
   for (const auto& overrides : variants) {
@@ -240,6 +241,23 @@ TEST(SchemaScene, TheSchemeOfThePaperBringsItsDefaults) {
   EXPECT_EQ(s.coupling.velocity_cap, 0.03);
   EXPECT_TRUE(s.coupling.median_filter);
   EXPECT_EQ(s.coupling.retraction, 0);
+  EXPECT_EQ(s.coupling.iterations, 4);
+}
+
+TEST(SchemaScene, PeskinIsCappedOnRequestAndParticleInKernelReachesFarther) {
+  const auto coupling = [](const std::string& keys) {
+    return parse_scene("format: hemowalk.scene/1\ncoupling: {scheme: peskin" + keys + "}\n", "s.yaml")
+        .coupling;
+  };
+  EXPECT_FALSE(coupling("").force_cap);
+  EXPECT_EQ(coupling("").retraction, 0);
+  EXPECT_DOUBLE_EQ(coupling(", force_cap: 3 pN").force_cap.value_or(0), 3e-12);
+  EXPECT_TRUE(
+      contains(errors_of(blood, {"coupling.scheme=peskin", "coupling.force_cap=0 pN"}), "out of range"));
+  EXPECT_TRUE(contains(errors_of(blood, {"coupling.scheme=peskin", "coupling.force_cap=3 um"}), "um"));
+  const Scene s = parse_scene("format: hemowalk.scene/1\ncontact: {model: particle_in_kernel}\n", "s.yaml");
+  EXPECT_DOUBLE_EQ(s.contact.range, 1e-6);
+  EXPECT_DOUBLE_EQ(s.contact.stiffness, 20e-6);
 }
 
 TEST(SchemaScene, ConditionsBetweenKeys) {

@@ -411,5 +411,13 @@ TEST(RanksOfTheSolver, TooManyRanksAreRefused) {
   EXPECT_NO_THROW(Simulation<float>(long_scene(), {crowd()[0]}, world()));
 }
 
+TEST(RanksOfTheSolver, OtherCouplingsAreRefusedOnSeveralRanks) {
+  data::Scene scene = long_scene();
+  scene.coupling.retraction = 0;
+  scene.coupling.scheme = data::Coupling::Scheme::paper;
+  on(1, [&](const mpi::Ranks& ranks) { EXPECT_NO_THROW(Simulation<float>(scene, crowd(), ranks)); });
+  on(2, [&](const mpi::Ranks& ranks) { EXPECT_THROW(Simulation<float>(scene, crowd(), ranks), InputError); });
+}
+
 }  // namespace
 }  // namespace hemowalk::resolved

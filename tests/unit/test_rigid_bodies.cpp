@@ -200,5 +200,25 @@ TEST(RigidBodies, NormalsAndAxisTurnWithTheBody) {
   EXPECT_NEAR(mesh::dot(bodies.observe(0).axis, mesh::rotate(q, {0, 1, 0})), 1, 1e-12);
 }
 
+TEST(RigidBodies, SlowDownAsAWholeUnderACap) {
+  const auto type = uneven_body();
+  RigidBodies<double> free(type), capped(type);
+  support::Numbers numbers(3);
+  std::vector<Vec3> w(type.rest.vertices.size());
+  for (auto& p : w) p = {1 + numbers(), numbers(), numbers()};
+  mesh::StepOptions options;
+  options.velocity_cap = 0.25;
+  for (auto* bodies : {&free, &capped}) {
+    bodies->add(1, {5, 6, 7}, mesh::rotation({1, 1, 0}, 0.5));
+    predict(*bodies, 0, w);
+    bodies->step(bodies == &capped ? options : mesh::StepOptions{});
+  }
+  const double ratio = mesh::norm(capped.velocity(0)) / mesh::norm(free.velocity(0));
+  EXPECT_LT(ratio, 1);
+  EXPECT_NEAR(mesh::norm(capped.angular_velocity(0)) / mesh::norm(free.angular_velocity(0)), ratio, 1e-14);
+  // Chords are shorter than arcs by (h omega)^2/24.
+  EXPECT_NEAR(support::largest(velocities(capped, 0)), 0.25, 0.25 * 1e-3);
+}
+
 }  // namespace
 }  // namespace hemowalk::rigid
