@@ -92,7 +92,7 @@ DeviceSolid<Real>::DeviceSolid(Place place, std::vector<Group<Real>>& groups, in
   for (auto& group : groups) shares_.emplace_back(std::make_unique<Share>(place, group))->cut(parts_);
 }
 
-/// Parts of equal size, on their way as soon as they are full.
+/// Parts of equal size, each with a copy of what its batches hold.
 template <class Real>
 void DeviceSolid<Real>::Share::cut(int number) {
   const auto host = this->host();
