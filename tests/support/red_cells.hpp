@@ -112,11 +112,23 @@ inline Collision collide(std::vector<data::Kind> kinds, double acceleration, dou
   return {std::nan(""), std::nan("")};
 }
 
+/// How far, um, the upper of two red cells that collide as above moves across the flow where there is no
+/// other: tumbling and lift off the walls, over the time in which undisturbed they would pass.
+inline double drift_alone(double acceleration, double offset, double kappa = 0.5, double apart = 11) {
+  const auto scene = shear_scene({14, 18, 36}, acceleration, {red_cell_kind(kappa)});
+  resolved::Simulation<float> sim(scene, {{0, {14, 18 + offset, 36 - apart}, mesh::identity_rotation, {}}});
+  const double start = observe(sim, 0, 0).centre[1];
+  const auto steps = static_cast<std::int64_t>(2 * apart / offset / sim.units().rate(100));
+  for (std::int64_t i = 0; i < steps; ++i) sim.step();
+  return 0.5 * (observe(sim, 0, 0).centre[1] - start);
+}
+
 /// Shape-recovery time, s: a red cell stretched by \p strain along its own x axis and released in fluid at
-/// rest; time constant of the displacement imposed from 80 to 40 % of it. Lattice of \p nodes a side.
+/// rest; time constant of the displacement imposed from 80 to 40 % of it. Lattice of \p nodes a side; looks
+/// \p every so many steps.
 inline double recovery_time(double kappa, double acceleration,
                             const mesh::Quaternion& orientation = mesh::identity_rotation, int nodes = 28,
-                            double strain = 0.1) {
+                            int every = 10, double strain = 0.1) {
   const double box = nodes / 2, middle = nodes / 2.0;
   auto scene = shear_scene({box, box, box}, acceleration, {red_cell_kind(kappa)});
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
@@ -146,7 +158,7 @@ inline double recovery_time(double kappa, double acceleration,
   };
   double early = 0;
   while (sim.time() < 2) {
-    for (int i = 0; i < 10; ++i) sim.step();
+    for (int i = 0; i < every; ++i) sim.step();
     const double left = excess();
     if (early == 0 && left < 0.8) early = sim.time();
     if (left < 0.4) return (sim.time() - early) / std::log(2.0);
