@@ -71,6 +71,7 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
       decomposition_(make_block(scene), std::move(ranks), thickest_reach(scene, units_, cells)),
       block_(decomposition_.block()),
       faces_(faces_of(scene, units_, decomposition_.divided())),
+      region_(scene),
       fluid_(block_, fluid_of(scene, units_, decomposition_.divided())),
       fields_(decomposition_, fluid_.border_size()),
       any_cells_(!cells.empty()),
@@ -87,9 +88,9 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
 
 template <class Real>
 void Simulation<Real>::start_flow() {
-  if (const Region region(scene_); region.has_solid()) {
+  if (region_.has_solid()) {
     const int first = decomposition_.first_plane();
-    fluid_.set_solid([&](int i, int j, int k) { return region.solid(i, j, first + k); });
+    fluid_.set_solid([&](int i, int j, int k) { return region_.solid(i, j, first + k); });
     for (int k = 0; k < block_.nz; ++k)
       for (int j = 0; j < block_.ny; ++j)
         for (int i = 0; i < block_.nx; ++i)
@@ -291,6 +292,7 @@ template <class Real>
 void Simulation<Real>::move_cells() {
   mesh::StepOptions options;
   options.iterations = scene_.coupling.iterations;
+  options.runge_kutta = scene_.coupling.integrator == data::Coupling::Integrator::runge_kutta;
   solid_report_ = {};
   const auto reports = solid_step_ ? solid_step_(options) : std::vector<mesh::StepReport>{};
   for (auto& group : groups_) {
@@ -426,6 +428,26 @@ void Simulation<Real>::take_force_from_solid() {
 }
 
 template <class Real>
+void Simulation<Real>::advance_fluid(View<const Node4<Real>> force, Real share) {
+  {
+    Stopwatch watch(timings_.fluid);
+    fluid_.begin_advance(force, velocity_.view(), share);
+  }
+  {
+    Stopwatch watch(timings_.communication);
+    fields_.stream(fluid_);
+  }
+  Stopwatch watch(timings_.fluid);
+  fluid_.end_advance(force, velocity_.view(), share);
+  const auto impulse = fluid_.wall_impulse();
+  taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
+  taken_.to_solid += impulse.solid;
+  for (int d = 0; d < 3; ++d)
+    taken_.from_body_force[d] +=
+        fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
+}
+
+template <class Real>
 void Simulation<Real>::step(EnergyBudget* budget) {
   const double start = omp_get_wtime(), before = timings_.accounted();
   if (budget) open_budget(*budget);
@@ -482,22 +504,7 @@ void Simulation<Real>::step(EnergyBudget* budget) {
   for (int k = 0; k < scene_.coupling.solid_every; ++k) {
     const Real share = k + 1 == scene_.coupling.solid_every ? velocity_share() : Real(0);
     if (budget) count_fluid(*budget, force, k == 0);
-    {
-      Stopwatch watch(timings_.fluid);
-      fluid_.begin_advance(force, velocity_.view(), share);
-    }
-    {
-      Stopwatch watch(timings_.communication);
-      fields_.stream(fluid_);
-    }
-    Stopwatch watch(timings_.fluid);
-    fluid_.end_advance(force, velocity_.view(), share);
-    const auto impulse = fluid_.wall_impulse();
-    taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
-    taken_.to_solid += impulse.solid;
-    for (int d = 0; d < 3; ++d)
-      taken_.from_body_force[d] +=
-          fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
+    fluid_step_ ? fluid_step_(force, velocity_.view(), share) : advance_fluid(force, share);
   }
   {
     Stopwatch watch(timings_.fluid);

@@ -24,6 +24,7 @@
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
+#include "resolved/region.hpp"
 #include "resolved/rigid/rigid.hpp"
 #include "resolved/units.hpp"
 
@@ -119,6 +120,11 @@ class Simulation {
   /// normals, a report per group (place.solid: device). Empty: the groups.
   using SolidStep = std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)>;
   void set_solid_step(SolidStep step) { solid_step_ = std::move(step); }
+  /// Who advances the fluid instead of the lattice Boltzmann fluid: writes the velocity that markers read,
+  /// with the given share of the force (all nodes, halo excepted). Empty: the fluid.
+  using FluidStep =
+      std::function<void(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real share)>;
+  void set_fluid_step(FluidStep step) { fluid_step_ = std::move(step); }
   /// Of this rank's cells.
   const contact::Summary& contact_summary() const { return contact_summary_; }
   /// Force of the cells on this rank's part of the lower and the upper wall in the last step, through kernels
@@ -163,6 +169,7 @@ class Simulation {
   void move_cells();
   void impulses();
   void spread();
+  void advance_fluid(View<const Node4<Real>> force, Real share);
   void take_force_from_solid();
   void hand_over();
   void open_budget(EnergyBudget& budget) const;
@@ -181,6 +188,7 @@ class Simulation {
   Decomposition decomposition_;
   Block block_;
   ibm::Faces faces_;
+  Region region_;
   lbm::Fluid<Real> fluid_;
   FieldExchange<Real> fields_;
   std::vector<Group<Real>> groups_;
@@ -213,6 +221,7 @@ class Simulation {
   std::int64_t arrivals_ = 0;
 
   SolidStep solid_step_;
+  FluidStep fluid_step_;
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;

@@ -2,7 +2,8 @@ if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
-            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp
+            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp verification/test_replaceable.cpp
+            verification/test_resolved_orientation.cpp
     LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
   add_executable(test_resolved_ranks ranks/ranks_main.cpp ranks/test_ranks.cpp ranks/test_resolved_ranks.cpp)

@@ -175,6 +175,7 @@ Coupling coupling_of(const Value& v) {
   if (v["velocity_cap"].type == Value::Type::number) c.velocity_cap = v["velocity_cap"].number();
   c.median_filter = v["median_filter"].boolean();
   c.iterations = static_cast<int>(v["iterations"].integer());
+  c.integrator = v["integrator"].choice<Coupling::Integrator>();
   return c;
 }
 

@@ -55,6 +55,7 @@ struct Coupling {
   std::optional<double> velocity_cap;  ///< lattice units
   bool median_filter = false;
   int iterations = 1;  ///< solid iterations per coupling step (conservative)
+  enum class Integrator { implicit, runge_kutta } integrator = Integrator::implicit;  ///< of the membranes
 };
 
 struct Contact {

@@ -99,6 +99,9 @@ Field coupling() {
           .when("scheme", paper),
       with_default("iterations", integer().at_least(1).at_most(1000), "1",
                    "solid iterations per coupling step"),
+      with_default(
+          "integrator", choice({"implicit", "runge_kutta"}), "implicit",
+          "of the membranes over a step; runge_kutta is explicit: accurate, for soft membranes only"),
   });
 }
 

@@ -86,7 +86,8 @@ Node coupling(const Coupling& c) {
                     {"chi", value(c.chi)},
                     {"velocity_cap", c.velocity_cap ? value(*c.velocity_cap) : scalar("off")},
                     {"median_filter", scalar(c.median_filter ? "true" : "false")},
-                    {"iterations", whole(c.iterations)}});
+                    {"iterations", whole(c.iterations)},
+                    {"integrator", word("coupling.integrator", c.integrator)}});
 }
 
 Node contact(const Contact& c) {

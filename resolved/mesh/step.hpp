@@ -5,6 +5,7 @@ namespace hemowalk::mesh {
 
 struct StepOptions {
   int iterations = 1;             ///< quasi-Newton iterations (membranes)
+  bool runge_kutta = false;       ///< classical, in place of the implicit step (membranes)
   bool damping = true;            ///< kappa damping (membranes)
   bool measure_residual = false;  ///< one more force evaluation, fills StepReport::residual (membranes)
 };

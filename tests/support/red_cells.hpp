@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "resolved/build.hpp"
+#include "resolved/mesh/vector.hpp"
+#include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
+#include "support/single_body.hpp"
 
 namespace hemowalk::test {
 
@@ -98,38 +100,38 @@ inline double net_displacement(double acceleration, bool with_platelet, double o
   return std::nan("");
 }
 
-/// Shape-recovery time, s: a red cell stretched by \p strain along x and released in fluid at rest; time
-/// constant of the extent along x from 80 to 40 % of the first excess over the rest length.
-inline double recovery_time(double kappa, double acceleration, double strain = 0.1) {
-  auto scene = shear_scene({14, 14, 14}, acceleration, {red_cell_kind(kappa)});
+/// Speed along the force, over force/(viscosity dx), of a cell that is pulled along its axis, which points
+/// along \p axis, in a periodic box of plasma at rest (um); relative to the mean flow. dx = 0.5 um.
+inline double settled_speed(const data::Kind& kind, double box, const mesh::Vec3& axis,
+                            const mesh::Vec3& shift = {}) {
+  auto scene = shear_scene({box, box, box}, 5, {kind});
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
-  const auto rest = resolved::make_mesh(scene.cells.kinds[0], scene.fluid.dx).vertices;
-  auto x = rest;
-  for (auto& p : x) p = {14 + p[0] * (1 + strain), 14 + p[1], 14 + p[2] / (1 + strain)};
-  resolved::Simulation<float> sim(scene, {{0, {14, 14, 14}, mesh::identity_rotation, x}});
-  const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
-  // Projection on the displacement that was imposed.
-  const auto excess = [&] {
-    const auto now = cells.positions(0);
-    mesh::Vec3 middle{};
-    for (const auto& p : now)
-      for (int d = 0; d < 3; ++d) middle[d] += p[d] / static_cast<double>(now.size());
-    double sum = 0, square = 0;
-    for (std::size_t k = 0; k < now.size(); ++k)
-      for (const int d : {0, 2}) {
-        const double u = x[k][d] - 14 - rest[k][d];
-        sum += (now[k][d] - middle[d] - rest[k][d]) * u, square += u * u;
-      }
-    return sum / square;
-  };
-  double early = 0;
-  while (sim.time() < 2) {
-    for (int i = 0; i < 10; ++i) sim.step();
-    const double left = excess();
-    if (early == 0 && left < 0.8) early = sim.time();
-    if (left < 0.4) return (sim.time() - early) / std::log(2.0);
+  const auto along = mesh::scale(1 / mesh::norm(axis), axis);
+  const double pull = 0.2e-12;
+  data::Vec3 force{};
+  for (int d = 0; d < 3; ++d) force[d] = pull * along[d];
+  scene.cells.loads = {{0, "+x", 1.0, force}};
+  // The axis of the rest shape is y.
+  const auto turn = mesh::cross({0, 1, 0}, along);
+  const double sine = mesh::norm(turn), angle = std::atan2(sine, along[1]);
+  const auto q = sine > 0 ? mesh::rotation(turn, angle) : mesh::identity_rotation;
+  resolved::Simulation<double> sim(scene, {{0, {box + shift[0], box + shift[1], box + shift[2]}, q, {}}});
+  const double n = sim.block().nx;
+  for (int i = 0; i < settling_steps(n); ++i) sim.step();
+  const resolved::Momentum m = sim.momentum();
+  const auto& cells = std::get<npfem::Membranes<double>>(sim.groups()[0].cells);
+  double speed = 0;
+  for (int d = 0; d < 3; ++d) {
+    double mean = 0;
+    for (int k = 0; k < cells.vertices(); ++k) mean += cells.velocities()[cells.layout().at(0, k, d)];
+    speed += along[d] * (mean / cells.vertices() - (m.fluid[d] + m.cells[d]) / (n * n * n));
   }
-  return std::nan("");
+  return speed * sim.fluid().viscosity() / sim.units().force(pull);
+}
+
+/// The program's t_c (resolved/recovery.hpp) of a red cell, s.
+inline double recovery_time(double kappa, double acceleration) {
+  return resolved::recovery_time(shear_scene({20, 20, 20}, 1, {red_cell_kind(kappa)}), acceleration);
 }
 
 }  // namespace hemowalk::test
