@@ -20,6 +20,6 @@ if(TARGET hemowalk_resolved)
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
-  hemowalk_test(validate_energy SOURCES validation/test_energy.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
+  hemowalk_test(validate_energy SOURCES validation/test_energy.cpp validation/test_leakage.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
   hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp validation/test_red_cells.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 3600)
 endif()
