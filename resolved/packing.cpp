@@ -11,6 +11,7 @@
 #include "core/text.hpp"
 #include "resolved/build.hpp"
 #include "resolved/contact/grid.hpp"
+#include "resolved/contact/walls.hpp"
 #include "resolved/region.hpp"
 #include "resolved/resolve.hpp"
 
@@ -128,6 +129,7 @@ class Packing {
   data::Scene scene_;
   LatticeUnits units_;
   Block block_;
+  Region region_;
   contact::Law law_;
   std::vector<Group<float>> groups_;
   Surfaces surfaces_;
@@ -142,7 +144,7 @@ data::Scene quasi_static(data::Scene scene) {
 }
 
 Packing::Packing(const data::Scene& scene)
-    : scene_(quasi_static(scene)), units_(scene_), block_(make_block(scene_)) {
+    : scene_(quasi_static(scene)), units_(scene_), block_(make_block(scene_)), region_(scene_) {
   law_ = make_contact(scene_, units_);
   law_.stiffness = std::max(law_.stiffness, units_.stiffness_density(least_stiffness));
   add_groups();
@@ -171,6 +173,10 @@ void Packing::add_groups() {
 contact::Domain Packing::domain(double scale) const {
   contact::Domain d = make_domain(scene_, block_);
   for (double& p : d.period) p /= scale;
+  if (const auto gap = region_.gap(); gap.size > 0) {
+    d.walls.geometry = contact::Walls::Geometry::surface;
+    d.walls.distance = gap.data, d.walls.nodes = {block_.nx, block_.ny, block_.nz}, d.walls.scale = scale;
+  }
   for (double* length : {&d.walls.lower, &d.walls.upper, &d.walls.x, &d.walls.y, &d.walls.radius})
     *length /= scale;
   return d;
@@ -248,7 +254,7 @@ void Packing::scatter() {
       spheres += b.cells * 4.18879 * std::pow(radius_of(b.kind), 3);
       largest = std::max(largest, radius_of(b.kind));
     }
-  const double room = units_.volume(Region(scene_).volume());
+  const double room = units_.volume(region_.volume());
   double needed = 0;  // with half the smallest gap around every cell
   for (const Batch& b : batches)
     if (b.cells > 0) {
@@ -265,6 +271,12 @@ void Packing::scatter() {
   const contact::Domain box = domain(scale_);
   const Vec3 size{block_.nx / scale_, block_.ny / scale_, block_.nz / scale_};
   using Geometry = contact::Walls::Geometry;
+  const contact::WallGaps<double> gaps(box.walls, {0, 0, 0});
+  const double known_gap = 0.99 * Region::gap_limit / scale_;
+  const auto clear = [&](const Vec3& x, double radius) {
+    return box.walls.geometry != Geometry::surface ||
+           gaps({x[0], x[1], x[2]}).gap >= std::min(radius, known_gap);
+  };
   require((box.walls.geometry != Geometry::slab || size[1] > 2 * largest) &&
               (box.walls.geometry != Geometry::tube || box.walls.radius > largest),
           "cells do not fit between the walls (bounding sphere against gap) enlarge the box");
@@ -316,7 +328,7 @@ void Packing::scatter() {
                 }
                 free = free && squared > (radius + s.radius) * (radius + s.radius);
               }
-        if (!free) continue;
+        if (!free || !clear(x, radius)) continue;
         placed = true;
         bin(at[0], at[1], at[2]).push_back({x, radius});
         std::visit(

@@ -42,6 +42,13 @@ void check_available(const Scene& scene, std::vector<std::string>& problems) {
         "coupling.solid_every > 1 blows up with a retracted coupling surface (measured: "
         "docs/evidence/resolved.md) use "
         "solid_every: 1, or retraction: 0");
+  if (scene.coupling.integrator == data::Coupling::Integrator::runge_kutta)
+    for (const auto& kind : scene.cells.kinds)
+      if (kind.rayleigh_beta > 0)
+        problems.push_back(
+            "cells.kinds." + kind.name +
+            ".rayleigh_beta with coupling.integrator runge_kutta (it knows kappa_damping only) use "
+            "0 us, or the implicit integrator");
   if (const std::string problem = place_problem(scene); !problem.empty()) problems.push_back(problem);
 }
 

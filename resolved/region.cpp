@@ -5,6 +5,7 @@
 
 #include "core/check.hpp"
 #include "resolved/build.hpp"
+#include "resolved/contact/geometry.hpp"
 #include "resolved/mesh/mesh.hpp"
 #include "resolved/mesh/mesh_file.hpp"
 
@@ -64,6 +65,45 @@ std::vector<std::uint8_t> outside(const mesh::TriangleMesh& surface, int nx, int
   return solid;
 }
 
+/// Distance of every node to the surface within \p limit, negative in the solid. What lies outside the box or
+/// on its faces (the caps of a vessel) does not bound the flow; the rest repeats with the box.
+std::vector<float> distances(const mesh::TriangleMesh& surface, const std::vector<std::uint8_t>& solid,
+                             const std::array<int, 3>& n, float limit) {
+  std::vector<float> gap(solid.size(), limit);
+  const auto point = [&](int v) {
+    const auto& x = surface.vertices[static_cast<std::size_t>(v)];
+    return contact::Point<double>{x[0], x[1], x[2]};
+  };
+  for (const auto& t : surface.triangles) {
+    int first[3], last[3];
+    bool outside = false;
+    for (int d = 0; d < 3; ++d) {
+      const auto [low, high] =
+          std::minmax({surface.vertices[t[0]][d], surface.vertices[t[1]][d], surface.vertices[t[2]][d]});
+      first[d] = static_cast<int>(std::ceil(low - limit - 0.5));
+      last[d] = static_cast<int>(std::floor(high + limit - 0.5));
+      outside = outside || high <= 1e-6 || low >= n[d] - 1e-6;
+    }
+    if (outside) continue;
+    const auto a = point(t[0]), b = point(t[1]), c = point(t[2]);
+    for (int k = first[2]; k <= last[2]; ++k)
+      for (int j = first[1]; j <= last[1]; ++j)
+        for (int i = first[0]; i <= last[0]; ++i) {
+          const auto wrap = [](int x, int period) { return (x % period + period) % period; };
+          float& here =
+              gap[(static_cast<std::size_t>(wrap(k, n[2])) * n[1] + wrap(j, n[1])) * n[0] + wrap(i, n[0])];
+          const auto q = contact::nearest_on_triangle<double>({i + 0.5, j + 0.5, k + 0.5}, a, b, c);
+          const double at[3] = {i + 0.5 - q.to_point.x, j + 0.5 - q.to_point.y, k + 0.5 - q.to_point.z};
+          bool in_box = true;
+          for (int d = 0; d < 3; ++d) in_box = in_box && at[d] >= -1e-6 && at[d] <= n[d] + 1e-6;
+          if (in_box) here = std::min(here, static_cast<float>(std::sqrt(q.squared)));
+        }
+  }
+  for (std::size_t m = 0; m < gap.size(); ++m)
+    if (solid[m]) gap[m] = -gap[m];
+  return gap;
+}
+
 }  // namespace
 
 Region::Region(const data::Scene& scene) {
@@ -80,6 +120,7 @@ Region::Region(const data::Scene& scene) {
   for (auto& v : surface.vertices)
     for (double& c : v) c *= scene.domain.stl_unit / dx;
   solid_ = outside(surface, nx_, ny_, nz_);
+  gap_ = distances(surface, solid_, {nx_, ny_, nz_}, gap_limit);
   const auto fluid = std::count(solid_.begin(), solid_.end(), 0);
   require(fluid > 0,
           scene.domain.stl_file +

@@ -57,6 +57,7 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
       decomposition_(make_block(scene), std::move(ranks), thickest_reach(scene, units_, cells)),
       block_(decomposition_.block()),
       faces_(faces_of(scene, units_, decomposition_.divided())),
+      region_(scene),
       fluid_(block_, fluid_of(scene, units_, decomposition_.divided())),
       fields_(decomposition_, fluid_.border_size()),
       any_cells_(!cells.empty()),
@@ -79,9 +80,9 @@ Simulation<Real>::Simulation(const data::Scene& scene, const std::vector<Initial
 
 template <class Real>
 void Simulation<Real>::start_flow() {
-  if (const Region region(scene_); region.has_solid()) {
+  if (region_.has_solid()) {
     const int first = decomposition_.first_plane();
-    fluid_.set_solid([&](int i, int j, int k) { return region.solid(i, j, first + k); });
+    fluid_.set_solid([&](int i, int j, int k) { return region_.solid(i, j, first + k); });
     for (int k = 0; k < block_.nz; ++k)
       for (int j = 0; j < block_.ny; ++j)
         for (int i = 0; i < block_.nx; ++i)
@@ -182,6 +183,7 @@ void Simulation<Real>::move_cells() {
   options.iterations = scene_.coupling.iterations;
   if (scheme_ == Scheme::paper && scene_.coupling.velocity_cap)
     options.velocity_cap = *scene_.coupling.velocity_cap;
+  options.runge_kutta = scene_.coupling.integrator == data::Coupling::Integrator::runge_kutta;
   solid_report_ = {};
   const auto reports = solid_.step ? solid_.step(options) : std::vector<mesh::StepReport>{};
   for (auto& group : groups_) {
@@ -311,9 +313,8 @@ void Simulation<Real>::find_cells() {
   markers_->locate(origin_.view(), sites_.view());
 }
 
-/// One fluid step with the present force; velocities of the new state for interpolation.
 template <class Real>
-void Simulation<Real>::advance_fluid(Real force_share) {
+void Simulation<Real>::stream_and_collide(Real force_share) {
   const View<const Node4<Real>> force = present_force();
   {
     Stopwatch watch(timings_.fluid);
@@ -323,16 +324,23 @@ void Simulation<Real>::advance_fluid(Real force_share) {
     Stopwatch watch(timings_.communication);
     fields_.stream(fluid_);
   }
-  {
-    Stopwatch watch(timings_.fluid);
-    fluid_.end_advance(force, velocity_.view(), force_share);
-    const auto impulse = fluid_.wall_impulse();
-    taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
-    taken_.to_solid += impulse.solid;
-    for (int d = 0; d < 3; ++d)
-      taken_.from_body_force[d] +=
-          fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
-  }
+  Stopwatch watch(timings_.fluid);
+  fluid_.end_advance(force, velocity_.view(), force_share);
+  const auto impulse = fluid_.wall_impulse();
+  taken_.to_lower_wall += impulse.lower, taken_.to_upper_wall += impulse.upper;
+  taken_.to_solid += impulse.solid;
+  for (int d = 0; d < 3; ++d)
+    taken_.from_body_force[d] +=
+        fluid_.parameters().body_force[d] * static_cast<double>(fluid_.fluid_nodes());
+}
+
+/// One fluid step with the present force; velocities of the new state for interpolation.
+template <class Real>
+void Simulation<Real>::advance_fluid(Real force_share) {
+  if (fluid_step_)
+    fluid_step_(present_force(), velocity_.view(), force_share);
+  else
+    stream_and_collide(force_share);
   fill_halo(velocity_.view());
 }
 

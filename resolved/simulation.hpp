@@ -25,6 +25,7 @@
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
+#include "resolved/region.hpp"
 #include "resolved/rigid/rigid.hpp"
 #include "resolved/surface_traction.hpp"
 #include "resolved/units.hpp"
@@ -125,6 +126,11 @@ class Simulation {
     std::function<void()> take_over;  ///< after it
   };
   void set_solid(SolidElsewhere solid) { solid_ = std::move(solid); }
+  /// Who advances the fluid instead of the lattice Boltzmann fluid: writes the velocity that markers read,
+  /// with the given share of the force (all nodes, halo excepted). Empty: the fluid.
+  using FluidStep =
+      std::function<void(View<const Node4<Real>> force, View<Node4<Real>> velocity, Real share)>;
+  void set_fluid_step(FluidStep step) { fluid_step_ = std::move(step); }
   /// Of this rank's cells.
   const contact::Summary& contact_summary() const { return contact_summary_; }
   /// Force of the cells on this rank's part of the lower and the upper wall in the last step, through kernels
@@ -175,6 +181,7 @@ class Simulation {
   View<const Node4<Real>> present_force() const {
     return any_cells_ ? View<const Node4<Real>>(force_.view()) : View<const Node4<Real>>{};
   }
+  void stream_and_collide(Real force_share);
   void advance_fluid(Real force_share);
   void hand_over();
   // The three couplings, coupling_*.cpp: cells move by h_, the fluid gets force_ (docs/adr/0011).
@@ -208,6 +215,7 @@ class Simulation {
   Decomposition decomposition_;
   Block block_;
   ibm::Faces faces_;
+  Region region_;
   lbm::Fluid<Real> fluid_;
   FieldExchange<Real> fields_;
   std::vector<Group<Real>> groups_;
@@ -249,6 +257,7 @@ class Simulation {
   std::int64_t arrivals_ = 0;
 
   SolidElsewhere solid_;
+  FluidStep fluid_step_;
   contact::Summary contact_summary_;
   std::array<std::array<double, 3>, 2> force_on_walls_{};
   mesh::StepReport solid_report_;

@@ -135,6 +135,12 @@ void Simulation<Real>::build_coupling() {
   copies_ = std::make_unique<Copies<Real>>(decomposition_, in_contact ? law.range : -1, vertices);
   if (in_contact) {
     contact::Domain domain = make_domain(scene_, block_);
+    if (const auto gap = region_.gap(); gap.size > 0) {
+      const Block& whole = decomposition_.whole();
+      domain.walls.geometry = contact::Walls::Geometry::surface;
+      domain.walls.distance = gap.data, domain.walls.nodes = {whole.nx, whole.ny, whole.nz};
+      domain.walls.first_plane = decomposition_.first_plane();
+    }
     if (decomposition_.divided()) domain.period[2] = 0;  // periodic images come as copies
     contact_ = std::make_unique<contact::Contact<Real>>(law, domain, shapes);
   }

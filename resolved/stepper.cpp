@@ -32,6 +32,9 @@ Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
   const bool any = place.solid == Place::device;
   impl_ = std::make_unique<Impl>(simulation, any ? device : Place::host);
   if (!any) return;
+  require(
+      simulation.scene().coupling.integrator == data::Coupling::Integrator::implicit,
+      "coupling.integrator runge_kutta on the device (its kernels know the implicit step) use place: host");
   if (place.fluid == Place::device) {
     require(simulation.ranks().count() == 1,
             "place: device on several ranks (the device's fluid and markers know one block) use one rank, "

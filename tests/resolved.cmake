@@ -2,7 +2,8 @@ if(TARGET hemowalk_resolved)
   hemowalk_test(test_resolved
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
-            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp
+            verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp verification/test_replaceable.cpp
+            verification/test_resolved_orientation.cpp
     LINK hemowalk_resolved LABELS unit verification)
   hemowalk_test(test_couplings
     SOURCES unit/test_surface_traction.cpp verification/test_resolved_couplings.cpp LINK hemowalk_resolved LABELS unit verification)
@@ -22,6 +23,6 @@ if(TARGET hemowalk_resolved)
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 14400)
   hemowalk_test(validate_rheology SOURCES validation/test_rheology.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400)
-  hemowalk_test(validate_energy SOURCES validation/test_energy.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400)
+  hemowalk_test(validate_energy SOURCES validation/test_energy.cpp validation/test_leakage.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400)
   hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp validation/test_red_cells.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400)
 endif()

@@ -56,6 +56,7 @@ struct Coupling {
   std::optional<double> force_cap;     ///< N, peskin
   bool median_filter = false;
   int iterations = 1;  ///< solid iterations per coupling step (conservative)
+  enum class Integrator { implicit, runge_kutta } integrator = Integrator::implicit;  ///< of the membranes
 };
 
 struct Contact {

@@ -107,6 +107,9 @@ Field coupling() {
       with_default("iterations", integer().at_least(1).at_most(1000), "4",
                    "solid iterations per coupling step")
           .when("scheme", paper),
+      with_default("integrator", choice({"implicit", "runge_kutta"}), "implicit",
+                   "of the membranes over a step; runge_kutta is explicit: accurate, for soft membranes only")
+          .when("scheme", ours),
   });
 }
 

@@ -87,6 +87,8 @@ Node coupling(const Coupling& c) {
             {"velocity_cap", c.velocity_cap ? value(*c.velocity_cap) : scalar("off")},
             {"median_filter", scalar(c.median_filter ? "true" : "false")},
             {"iterations", whole(c.iterations)}};
+  if (c.scheme == Coupling::Scheme::conservative)
+    m.emplace_back("integrator", word("coupling.integrator", c.integrator));
   if (c.scheme == Coupling::Scheme::peskin)
     m.emplace_back("force_cap", c.force_cap ? value(*c.force_cap, "N") : scalar("off"));
   return yaml::map(std::move(m));

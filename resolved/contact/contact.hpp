@@ -36,10 +36,17 @@ struct Law {
 
 /// Rigid surfaces that enclose the fluid.
 struct Walls {
-  enum class Geometry { none, slab, tube } geometry = Geometry::none;
+  enum class Geometry { none, slab, tube, surface } geometry = Geometry::none;
   double lower = 0, upper = 0;  ///< slab: planes y = lower and y = upper
   double x = 0, y = 0;          ///< tube: axis, along z
   double radius = 0;            ///< tube
+  /// surface, host only: signed distance, positive in the fluid, at the nodes (i + 1/2, j + 1/2, k + 1/2) of
+  /// a periodic lattice, [k][j][i]. Bodies see its trilinear interpolation and are pushed along that one's
+  /// gradient, so the force has a potential. Must outlive the contact.
+  const float* distance = nullptr;
+  std::array<int, 3> nodes{};
+  int first_plane = 0;  ///< of the block, in that lattice
+  double scale = 1;     ///< the lattice's spacings per length: below 1 the surface is that much larger
 };
 
 struct Domain {

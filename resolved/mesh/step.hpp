@@ -6,8 +6,9 @@
 namespace hemowalk::mesh {
 
 struct StepOptions {
-  int iterations = 1;                                             ///< quasi-Newton iterations (membranes)
-  bool damping = true;                                            ///< kappa damping (membranes)
+  int iterations = 1;        ///< quasi-Newton iterations (membranes)
+  bool runge_kutta = false;  ///< classical, in place of the implicit step (membranes)
+  bool damping = true;       ///< kappa damping (membranes)
   double velocity_cap = std::numeric_limits<double>::infinity();  ///< largest speed a vertex moves with
   bool measure_residual = false;  ///< one more force evaluation, fills StepReport::residual (membranes)
 };

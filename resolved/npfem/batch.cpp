@@ -287,6 +287,34 @@ template <class Real>
   }
 }
 
+/// The implicit step is x' = v'(x) by backward Euler, m/(h (1 - kappa)) (v' - wanted) = F_int(x); here
+/// classical Runge-Kutta, stable while h^2 (1 - kappa)/m times the stiffness stays below 2.8.
+template <class Real>
+void BatchKernel<Real>::runge_kutta(const BatchFields<Real>& b, const Frame& frame, bool damping) {
+  constexpr Real weight[4] = {Real(1. / 6), Real(1. / 3), Real(1. / 3), Real(1. / 6)};
+  constexpr Real ahead[4] = {Real(0.5), Real(0.5), Real(1), Real(0)};
+  Real* sum = s_.response.data();
+  std::memset(sum, 0, sizeof(Real) * s_.response.size());
+  std::memset(s_.increment.data(), 0, sizeof(Real) * s_.increment.size());
+  std::memcpy(s_.moved.data(), b.residual, sizeof(Real) * s_.moved.size());
+  for (int stage = 0; stage < 4; ++stage) {
+    const P p = membrane_forces(b.offset);
+    for (int k = 0; k < t_.vertices; ++k) {
+      V wanted = load3(b.predicted, k);
+      Real rate = t_.mass_rate[k];
+      if (damping)
+        wanted = wanted + t_.kappa[k] * (frame.at(load3(b.offset, k)) - wanted);
+      else
+        rate *= 1 - t_.kappa[k];
+      const V force = load3(s_.force.data(), k) - p * load3(s_.gradient.data(), k);
+      const V d = t_.h * wanted + (1 / rate) * force;
+      store3(load3(sum, k) + weight[stage] * d, sum, k);
+      store3(load3(b.residual, k) + ahead[stage] * d, s_.moved.data(), k);
+    }
+  }
+  std::memcpy(s_.increment.data(), sum, sizeof(Real) * s_.increment.size());
+}
+
 /// x <- N^{-1} x by two triangular sweeps, the three components and all lanes at
 /// once.
 template <class Real>
@@ -435,7 +463,8 @@ auto BatchKernel<Real>::step(const BatchFields<Real>& b, const mesh::StepOptions
   const bool damping = options.damping && t_.damped;
   const Frame frame = find_frame(b);
   Report report{P(0), P(0), P(0)};
-  for (int i = 0; i < options.iterations; ++i) {
+  if (options.runge_kutta) runge_kutta(b, frame, damping);
+  for (int i = 0; i < options.iterations && !options.runge_kutta; ++i) {
     unbalance(b, frame, damping);
     t_.stiff_volume ? solve_with_volume() : solve(s_.force.data());
     report.increment = correct(b);

@@ -96,6 +96,9 @@ class BatchKernel {
   /// \returns sum of squares of the inertial part, for scale.
   P unbalance(const BatchFields<Real>& b, const Frame& frame, bool damping);
   void add_rayleigh();
+  /// The increment of x' = v'(x), v' the velocity at which inertia, damping and the forces at x balance, over
+  /// h.
+  void runge_kutta(const BatchFields<Real>& b, const Frame& frame, bool damping);
   void solve(Real* x);
   /// The same for N + (k_v/sum |g|^2) g g^T (Woodbury), where the volume term is too stiff for N alone.
   void solve_with_volume();

@@ -5,8 +5,10 @@
 #include <cstdio>
 #include <vector>
 
-#include "resolved/build.hpp"
+#include "resolved/mesh/vector.hpp"
+#include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
+#include "support/single_body.hpp"
 
 namespace hemowalk::test {
 
@@ -123,12 +125,11 @@ inline double drift_alone(double acceleration, double offset, double kappa = 0.5
   return 0.5 * (observe(sim, 0, 0).centre[1] - start);
 }
 
-/// Shape-recovery time, s: a red cell stretched by \p strain along its own x axis and released in fluid at
-/// rest; time constant of the displacement imposed from 80 to 40 % of it. Lattice of \p nodes a side; looks
-/// \p every so many steps.
-inline double recovery_time(double kappa, double acceleration,
-                            const mesh::Quaternion& orientation = mesh::identity_rotation, int nodes = 28,
-                            int every = 10, double strain = 0.1) {
+/// How a red cell lying any way comes back, s: stretched by \p strain along its own x axis and released in
+/// fluid at rest; time constant of the displacement imposed from 80 to 40 % of it (the program's t_c is the
+/// 1/e time of the length, below). Lattice of \p nodes a side; looks \p every so many steps.
+inline double return_time(double kappa, double acceleration, const mesh::Quaternion& orientation, int nodes,
+                          int every, double strain = 0.1) {
   const double box = nodes / 2, middle = nodes / 2.0;
   auto scene = shear_scene({box, box, box}, acceleration, {red_cell_kind(kappa)});
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
@@ -164,6 +165,40 @@ inline double recovery_time(double kappa, double acceleration,
     if (left < 0.4) return (sim.time() - early) / std::log(2.0);
   }
   return std::nan("");
+}
+
+/// Speed along the force, over force/(viscosity dx), of a cell that is pulled along its axis, which points
+/// along \p axis, in a periodic box of plasma at rest (um); relative to the mean flow. dx = 0.5 um.
+inline double settled_speed(const data::Kind& kind, double box, const mesh::Vec3& axis,
+                            const mesh::Vec3& shift = {}) {
+  auto scene = shear_scene({box, box, box}, 5, {kind});
+  scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
+  const auto along = mesh::scale(1 / mesh::norm(axis), axis);
+  const double pull = 0.2e-12;
+  data::Vec3 force{};
+  for (int d = 0; d < 3; ++d) force[d] = pull * along[d];
+  scene.cells.loads = {{0, "+x", 1.0, force}};
+  // The axis of the rest shape is y.
+  const auto turn = mesh::cross({0, 1, 0}, along);
+  const double sine = mesh::norm(turn), angle = std::atan2(sine, along[1]);
+  const auto q = sine > 0 ? mesh::rotation(turn, angle) : mesh::identity_rotation;
+  resolved::Simulation<double> sim(scene, {{0, {box + shift[0], box + shift[1], box + shift[2]}, q, {}}});
+  const double n = sim.block().nx;
+  for (int i = 0; i < settling_steps(n); ++i) sim.step();
+  const resolved::Momentum m = sim.momentum();
+  const auto& cells = std::get<npfem::Membranes<double>>(sim.groups()[0].cells);
+  double speed = 0;
+  for (int d = 0; d < 3; ++d) {
+    double mean = 0;
+    for (int k = 0; k < cells.vertices(); ++k) mean += cells.velocities()[cells.layout().at(0, k, d)];
+    speed += along[d] * (mean / cells.vertices() - (m.fluid[d] + m.cells[d]) / (n * n * n));
+  }
+  return speed * sim.fluid().viscosity() / sim.units().force(pull);
+}
+
+/// The program's t_c (resolved/recovery.hpp) of a red cell, s.
+inline double recovery_time(double kappa, double acceleration) {
+  return resolved::recovery_time(shear_scene({20, 20, 20}, 1, {red_cell_kind(kappa)}), acceleration);
 }
 
 }  // namespace hemowalk::test

@@ -28,6 +28,37 @@ void free_flight(Membranes<double>& cells) {
   for (std::size_t i = 0; i < v.size; ++i) cells.predicted()[i] = v[i];
 }
 
+/// Massless relaxation zeta x' = F_int(x): with metric/h = zeta and v_pred = 0 a step is backward Euler or
+/// Runge-Kutta of this equation. The stretched cell is symmetric, so that the projection on its momenta,
+/// which are zero, takes nothing.
+TEST_F(Dynamics, RungeKuttaIsOfFourthOrderWhereTheImplicitStepIsOfFirst) {
+  Material m;
+  m.C = 50;
+  const double drag = 100, end = 1.6;  // pN us/um per vertex, us
+  const auto relax = [&](double h, bool runge_kutta) {
+    const auto type = support::red_cell_type(3, m, h, drag * h * 38);
+    Membranes<double> cells(type);
+    cells.add(0, {0, 0, 0}, mesh::identity_rotation);
+    auto x = type->rest().vertices;
+    for (auto& p : x) p = {1.04 * p[0], p[1] * 0.97, p[2] * 0.98};
+    cells.set_positions(0, x);
+    for (int i = 0; i < std::lround(end / h); ++i) {
+      std::fill(cells.predicted().data, cells.predicted().data + cells.predicted().size, 0.0);
+      cells.step({.iterations = 30, .runge_kutta = runge_kutta});
+    }
+    return cells.positions(0);
+  };
+  const auto exact = relax(0.0125, true);
+  const auto order = [&](bool runge_kutta, double h) {
+    return std::log2(support::largest_difference(relax(h, runge_kutta), exact) /
+                     support::largest_difference(relax(h / 2, runge_kutta), exact));
+  };
+  EXPECT_NEAR(order(true, 0.2), 4, 0.5);
+  EXPECT_NEAR(order(true, 0.1), 4, 0.4);
+  EXPECT_NEAR(order(false, 0.1), 1, 0.15);
+  EXPECT_NEAR(order(false, 0.05), 1, 0.1);
+}
+
 /// Implicit Euler against Runge-Kutta of fourth order: first order in h.
 TEST_F(Dynamics, ImplicitStepIsOfFirstOrder) {
   Material m;

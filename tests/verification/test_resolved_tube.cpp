@@ -120,6 +120,53 @@ void expect_momentum_to_close(double relative) {
 TEST(Tube, MomentumOfFluidCellsAndSolidClosesInDouble) { expect_momentum_to_close<double>(1e-12); }
 TEST(Tube, MomentumOfFluidCellsAndSolidClosesInSingle) { expect_momentum_to_close<float>(1e-5); }
 
+/// A red cell pulled along x against the wall of a tube given by its diameter or as a surface from a file.
+/// \returns the largest distance of a vertex from the axis, dx.
+template <class Real>
+double pressed_against_wall(bool from_file, Momentum& start, Momentum& end) {
+  data::Scene scene = tube_scene(14, 16, 12);
+  scene.flow.type = data::Flow::Type::rest;
+  scene.cells.loads = {{0, "+x", 1.0, {300e-12, 0, 0}}};
+  if (from_file) {
+    scene.domain.geometry = Geometry::stl;
+    scene.domain.stl_file = write_cylinder(8, 8, 7, -1, 13, 300), scene.domain.stl_unit = 1e-6;
+  }
+  const std::vector<InitialCell> cells{{0, {16 + 9.5, 16, 12}, mesh::rotation({0, 0, 1}, M_PI / 2), {}}};
+  Simulation<Real> sim(scene, cells);
+  start = sim.momentum();
+  double farthest = 0;
+  for (int i = 0; i < 400; ++i) sim.step();
+  end = sim.momentum();
+  const auto& group = sim.groups()[0];
+  for (const auto& x : std::visit([](const auto& g) { return g.positions(0); }, group.cells))
+    farthest = std::max(farthest, std::hypot(x[0] - 16, x[1] - 16));
+  return farthest;
+}
+
+// Radius 14 dx. The polygon of 300 sides lies within 14 (1 - cos(pi/300)) = 8e-4 dx of the circle, the
+// trilinear distance within dx^2/(8 R) = 9e-3 dx of the polygon's.
+TEST(Tube, ACellPressedAgainstASurfaceFromAFileStaysOffItAsOffTheTube) {
+  Momentum start, end;
+  const double tube = pressed_against_wall<double>(false, start, end);
+  const double file = pressed_against_wall<double>(true, start, end);
+  EXPECT_LT(file, 14);
+  EXPECT_GT(file, 13) << "the cell should be within the contact's range";
+  EXPECT_NEAR(file, tube, 0.02);
+  EXPECT_GT(std::abs(end.to_lower_wall[0]), 1e-3 * end.from_loads[0]) << "the reaction is the wall's";
+  for (int d = 0; d < 3; ++d)
+    EXPECT_LT(std::abs(end.total()[d] - start.total()[d]), 1e-11 * end.scale()) << "component " << d;
+}
+
+TEST(Tube, PackingStaysInsideASurfaceFromAFile) {
+  data::Scene scene = tube_scene(20, 22, 20);
+  scene.domain.geometry = Geometry::stl;
+  scene.domain.stl_file = write_cylinder(11, 11, 10, 0, 20, 100), scene.domain.stl_unit = 1e-6;
+  const auto cells = pack(scene);
+  ASSERT_EQ(static_cast<int>(cells.size()), census(scene).rbc + census(scene).platelets);
+  for (const auto& cell : cells)
+    for (const auto& v : cell.vertices) EXPECT_LT(std::hypot(v[0] - 22, v[1] - 22), 20);
+}
+
 TEST(Tube, PackingStaysInsideAndCountsTheTubesVolume) {
   data::Scene scene = tube_scene(20, 22, 20);
   EXPECT_EQ(census(scene).rbc, static_cast<int>(0.2 * M_PI * 100 * 20 / 91.79921));
