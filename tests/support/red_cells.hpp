@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <vector>
 
+#include "resolved/build.hpp"
 #include "resolved/mesh/vector.hpp"
 #include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"

