@@ -177,7 +177,7 @@ Coupling coupling_of(const Value& v) {
   c.force_cap = maybe(v, "force_cap");
   c.median_filter = v["median_filter"].boolean();
   c.iterations = static_cast<int>(v["iterations"].integer());
-  c.integrator = v["integrator"].choice<Coupling::Integrator>();
+  if (v.has("integrator")) c.integrator = v["integrator"].choice<Coupling::Integrator>();
   return c;
 }
 

@@ -55,7 +55,7 @@ grep -q '"exit_code": 3' blow/status.json || { fail "status after the blow-up"; 
 attempt() { for _ in $(seq 1200); do grep -q "\"attempt\": $1" stopped/status.json && return; sleep 0.05; done; fail "attempt $1 never began"; }
 
 # Stopped through mpirun: a checkpoint and 75; goes on on the same ranks, and on one.
-sed 's/end: 0.6 ms, sample: 0.1 ms/end: 4 ms, sample: 0.1 ms/' scene.yaml >long.yaml
+sed 's/end: 0.6 ms, sample: 0.1 ms/end: 12 ms, sample: 0.1 ms/' scene.yaml >long.yaml
 start_ranks 2 resolve long.yaml --out stopped >out.txt 2>&1
 for _ in $(seq 1200); do grep -q '"progress": 0.[0-9]*[1-9]' stopped/status.json 2>/dev/null && break; sleep 0.05; done
 kill -USR1 $run
