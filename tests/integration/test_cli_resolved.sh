@@ -23,7 +23,7 @@ scene:
   domain: {size: [12 um, 12 um, 12 um]}
   flow: {type: couette, shear_rate: 100 1/s, walls: both}
   cells: {hematocrit: 0.22, platelets_per_rbc: 1}
-  time: {end: 6 ms, sample: 0.1 ms, profile: 2 ms}
+  time: {end: 24 ms, sample: 0.1 ms, profile: 2 ms}
 calibrate: {t0: 1 ms, lag: 1 ms, bootstrap: 20}
 on_failure: {action: retry, attempts: 2}
 YAML
