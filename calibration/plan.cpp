@@ -9,7 +9,6 @@
 #include "core/text.hpp"
 
 namespace hemowalk::calibration {
-namespace {}  // namespace
 
 Plan plan_for(double relative_error, const PlanInput& in) {
   require(relative_error > 0 && relative_error < 1,
