@@ -11,6 +11,7 @@
 
 #include "resolved/mesh/shapes.hpp"
 #include "support/boundary_integral.hpp"
+#include "support/figure.hpp"
 #include "support/red_cells.hpp"
 #include "support/reference_data.hpp"
 #include "support/single_body.hpp"
@@ -154,6 +155,35 @@ Series measure(double Ca) {
   return s;
 }
 
+void draw(double Ca, const Series& s, const References* published) {
+  using Style = test::Figure::Style;
+  char name[64], title[96];
+  std::snprintf(name, sizeof name, "capsule_ca_%g", Ca);
+  std::snprintf(title, sizeof title, "Neo-Hookean capsule in shear, Ca = %g", Ca);
+  test::Figure figure(name, title, "strain", "Taylor deformation D");
+  figure.with("set xrange [0:6]").with("set yrange [0:]");
+  figure.curve("boundary integral, unbounded", Style::line, 6, exact(Ca).strain, exact(Ca).D);
+  for (std::size_t i = 0; i < s.runs.size(); ++i) {
+    char label[64];
+    std::snprintf(label, sizeof label, "hemowalk, a = %g dx", s.spacing[i]);
+    auto D = s.runs[i].D;
+    for (std::size_t k = 0; k < D.size(); ++k) D[k] = s.without_images(i, s.runs[i].strain[k]);
+    figure.curve(label, Style::line, static_cast<int>(i), s.runs[i].strain, D);
+  }
+  if (published) {
+    const char* const sources[] = {"Pozrikidis 1995", "Ramanujan and Pozrikidis 1998",
+                                   "Doddi and Bagchi 2008"};
+    for (int i = 0; i < 3; ++i) {
+      const auto& curve = published->curves[i];
+      std::vector<double> t, D;
+      for (double at = 0.25; at < end; at += 0.25)
+        if (curve.covers(at)) t.push_back(at), D.push_back(curve(at));
+      figure.curve(sources[i], Style::points, 3 + i, t, D);
+    }
+  }
+  figure.write();
+}
+
 /// Prints the table and holds it against the boundary integral: the extrapolated deformation at strain 6
 /// within \p tolerance.
 Series compare(double Ca, double tolerance, const References* published = nullptr) {
@@ -175,6 +205,7 @@ Series compare(double Ca, double tolerance, const References* published = nullpt
       100 * (steady(s.runs[0]) / steady(e) - 1), 100 * (s.without_images(0, end) / steady(e) - 1),
       100 * (s.without_images(s.runs.size() - 1, end) / steady(e) - 1),
       100 * (s.extrapolated(end) / steady(e) - 1), s.runs[0].volume, e.volume);
+  draw(Ca, s, published);
   EXPECT_NEAR(s.extrapolated(end) / steady(e), 1, tolerance);
   EXPECT_NEAR(steady(s.runs[0]) / steady(e), 1, 0.1);
   for (const auto& r : s.runs) EXPECT_NEAR(r.volume, 1, 0.002);

@@ -9,6 +9,7 @@
 #include "resolved/packing.hpp"
 #include "resolved/simulation.hpp"
 #include "support/blood_scene.hpp"
+#include "support/figure.hpp"
 
 namespace hemowalk::resolved {
 namespace {
@@ -28,6 +29,7 @@ void expect_invariants(const data::Scene& scene, double end) {
   const Momentum start = sim.momentum();
   Momentum last = start;
   double lower = 0, upper = 0, core = 0, residual = 0;
+  std::vector<double> times, below, above, height, speed;
   std::printf(
       "t/ms  stress lower upper / mu gamma  core shear  <u_x>/U  volume min max  gap/dx  momentum "
       "residual\n");
@@ -42,6 +44,12 @@ void expect_invariants(const data::Scene& scene, double end) {
     const auto planes = sim.fluid().profiles(sim.force());
     core =
         (planes.velocity[n * 7 / 10][2] - planes.velocity[n * 3 / 10][2]) / (n * 7 / 10 - n * 3 / 10) / rate;
+    times.push_back(1e3 * sim.time()), below.push_back(lower), above.push_back(upper);
+    speed.resize(n), height.resize(n);
+    for (int j = 0; j < n; ++j) {
+      height[j] = (j + 0.5) / n;
+      if (2 * i > steps) speed[j] += planes.velocity[j][2] / (rate * n);
+    }
     double vorticity = 0, smallest = 2, largest = 0, scale = 0;
     for (const auto& u : planes.velocity) vorticity += u[0] / n / (rate * n);
     residual = 0;
@@ -62,6 +70,20 @@ void expect_invariants(const data::Scene& scene, double end) {
     EXPECT_GT(smallest, 0.99);
     EXPECT_LT(largest, 1.01);
   }
+  using Style = test::Figure::Style;
+  const std::string box = std::to_string(n / 2);
+  for (double& u : speed) u /= (parts + 1) / 2;
+  test::Figure("suspension_" + box + "um_stress", "Blood at 35 % in a box of " + box + " µm", "time, ms",
+               "wall shear stress over that of plasma")
+      .with("set yrange [0:]")
+      .curve("lower wall", Style::dots, 0, times, below)
+      .curve("upper wall", Style::dots, 1, times, above)
+      .write();
+  test::Figure("suspension_" + box + "um_velocity", "Velocity, second half of the run", "height over gap",
+               "velocity over that of the wall")
+      .curve("blood", Style::line, 1, height, speed)
+      .curve("plasma alone", Style::dashes, -1, height, height)
+      .write();
   const Timings& t = sim.timings();
   std::printf("ms per step: fluid %.2f interpolation %.2f spreading %.2f solid %.2f contact %.2f\n",
               1e3 * t.fluid / t.steps, 1e3 * t.interpolation / t.steps, 1e3 * t.spreading / t.steps,

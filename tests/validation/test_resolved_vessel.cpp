@@ -9,6 +9,7 @@
 #include "resolved/resolve.hpp"
 #include "resolved/simulation.hpp"
 #include "support/blood_scene.hpp"
+#include "support/figure.hpp"
 
 namespace hemowalk::resolved {
 namespace {
@@ -83,6 +84,7 @@ Vessel measure(double diameter, double hematocrit, double duration) {
   Vessel now{};
   double bulk = 0, cells = 0, layer = 0;
   int samples = 0, window = 1;
+  std::vector<double> until, viscosity, fahraeus, viscosity_pries, fahraeus_pries;
   std::printf("until, ms | viscosity | tube over discharge hematocrit | plasma layer, um\n");
   for (std::int64_t step = 1; window <= windows; ++step) {
     sim.step();
@@ -104,8 +106,22 @@ Vessel measure(double diameter, double hematocrit, double duration) {
     std::printf("%.0f | %.3f | %.3f | %.2f\n", 1e3 * sim.time(), now.viscosity, now.fahraeus,
                 now.plasma_layer);
     std::fflush(stdout);
+    until.push_back(1e3 * sim.time());
+    viscosity.push_back(now.viscosity), viscosity_pries.push_back(pries_viscosity(diameter, now.discharge));
+    fahraeus.push_back(now.fahraeus), fahraeus_pries.push_back(pries_fahraeus(diameter, now.discharge));
     bulk = cells = layer = 0, samples = 0, ++window;
   }
+  using Style = test::Figure::Style;
+  char name[64], title[96];
+  std::snprintf(name, sizeof name, "vessel_%.0fum_%.0f", diameter, 100 * hematocrit);
+  std::snprintf(title, sizeof title, "Tube of %.0f µm, tube hematocrit %.2f", diameter, true_hematocrit);
+  test::Figure(name, title, "time, ms", "")
+      .with("set yrange [0:]")
+      .curve("relative viscosity", Style::dots, 0, until, viscosity)
+      .curve("Pries et al. 1992", Style::dashes, 0, until, viscosity_pries)
+      .curve("tube over discharge hematocrit", Style::dots, 1, until, fahraeus)
+      .curve("Pries et al. 1992", Style::dashes, 1, until, fahraeus_pries)
+      .write();
   return now;
 }
 

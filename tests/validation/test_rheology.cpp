@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "support/figure.hpp"
 #include "support/suspension.hpp"
 
 namespace hemowalk::resolved {
@@ -61,6 +62,8 @@ void expect_sound(const std::vector<SuspensionResult>& runs) {
 TEST(Rheology, ViscosityOverHematocrit) {
   std::printf("| Ht | wide tube at the core's Ht |%s\n", columns);
   double before = 1;
+  std::vector<double> nominal, inside, gap, gap_error, core_value, core_error, smooth, law;
+  for (double h = 0; h < 0.501; h += 0.02) smooth.push_back(h), law.push_back(wide_tube_viscosity(h));
   for (const double hematocrit : {0.1, 0.2, 0.3, 0.45}) {
     SuspensionCase c;
     c.hematocrit = hematocrit;
@@ -74,7 +77,20 @@ TEST(Rheology, ViscosityOverHematocrit) {
     before = viscosity;
     EXPECT_NEAR(test::mean_of(runs, &SuspensionResult::core_viscosity).value / wide_tube_viscosity(core), 1,
                 0.4);
+    const auto finite = [](double error) { return std::isfinite(error) ? error : 0; };
+    const auto middle = test::mean_of(runs, &SuspensionResult::core_viscosity);
+    nominal.push_back(hematocrit), inside.push_back(core);
+    gap.push_back(viscosity);
+    gap_error.push_back(finite(test::mean_of(runs, &SuspensionResult::viscosity).error));
+    core_value.push_back(middle.value), core_error.push_back(finite(middle.error));
   }
+  using Style = test::Figure::Style;
+  test::Figure("viscosity_over_hematocrit", "Red cells between walls 20 µm apart", "hematocrit",
+               "viscosity over that of plasma")
+      .curve("whole gap", Style::points, 0, nominal, gap, gap_error)
+      .curve("core, at its own hematocrit and shear rate", Style::points, 1, inside, core_value, core_error)
+      .curve("wide tube, Pries et al. 1992", Style::line, -1, smooth, law)
+      .write();
 }
 
 // Blood thins under shear, also where nothing aggregates. A box of 15 um.

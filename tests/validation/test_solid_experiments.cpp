@@ -14,6 +14,7 @@
 #include "resolved/npfem/terms/neo_hookean.hpp"
 #include "resolved/npfem/terms/skalak.hpp"
 #include "support/cells.hpp"
+#include "support/figure.hpp"
 #include "support/reference_data.hpp"
 
 namespace hemowalk::npfem {
@@ -85,6 +86,16 @@ TEST(OpticalTweezers, ParameterSetsAgainstTheScatter) {
               {"Skalak: Gs 4, C 10, k_b 1", skalak(4), false},
               {"Skalak: Gs 5.3, C 10, k_b 1", skalak(5.3), false}};
   double best = 0;
+  using Style = test::Figure::Style;
+  test::Figure figure("optical_tweezers", "Red cell pulled by optical tweezers", "force, pN", "diameter, µm");
+  std::vector<double> middle[2], half[2];
+  for (const auto& row : scatter)
+    for (const int i : {0, 1})
+      middle[i].push_back((row[1 + 3 * i] + row[3 + 3 * i]) / 2),
+          half[i].push_back((row[3 + 3 * i] - row[1 + 3 * i]) / 2);
+  figure.curve("experiment, scatter", Style::points, -1, forces, middle[0], half[0]);
+  figure.curve("", Style::points, -1, forces, middle[1], half[1]);
+  int colour = 0;
   for (const auto& set : sets) {
     const auto cells = stretch(set.material, forces);
     std::printf("%s (pN/um, pN um)\nforce/pN  axial/um [scatter]  transverse/um [scatter]\n", set.name);
@@ -102,8 +113,13 @@ TEST(OpticalTweezers, ParameterSetsAgainstTheScatter) {
     const double points = 2.0 * static_cast<double>(forces.size());
     std::printf("inside: %d of %.0f (%.0f %%), rms deviation from the middle %.1f %%\n", inside, points,
                 100 * inside / points, 100 * std::sqrt(square / points));
+    std::vector<double> axial, transverse;
+    for (const auto& cell : cells) axial.push_back(cell.axial), transverse.push_back(cell.transverse);
+    figure.curve(set.name, Style::dots, colour, forces, axial);
+    figure.curve("", Style::dots, colour++, forces, transverse);
     if (set.shipped) best = std::max(best, inside / points);
   }
+  figure.with("set yrange [0:22]").write();
   EXPECT_GE(best, 0.95);
 }
 
