@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/device_choice.hpp"
 #include "core/portability.hpp"
 #include "core/view.hpp"
 #if defined(HEMOWALK_CUDA)
@@ -45,7 +46,8 @@ class Array {
         std::memset(raw + p * page, 0, std::min<std::size_t>(page, bytes - p * page));
     } else {
 #if defined(HEMOWALK_CUDA)
-      if (cudaMalloc(reinterpret_cast<void**>(&data_), bytes) != cudaSuccess) throw std::bad_alloc();
+      if (!use_device() || cudaMalloc(reinterpret_cast<void**>(&data_), bytes) != cudaSuccess)
+        throw std::bad_alloc();
       cudaMemset(data_, 0, bytes), cudaStreamSynchronize(nullptr);  // a Queue's stream does not wait for it
 #else
       throw std::bad_alloc();  // built without CUDA: there is no device

@@ -19,7 +19,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <numeric>
@@ -32,6 +31,7 @@
 
 #include "core/array.hpp"
 #include "core/check.hpp"
+#include "core/device_choice.hpp"
 #include "core/portability.hpp"
 
 #if defined(HEMOWALK_CUDA)
@@ -165,14 +165,6 @@ inline bool device_present() {
 #endif
 }
 
-/// Which of \p count devices this process takes: the ranks of a machine take turns. Their numbers on the
-/// machine are the launcher's: Open MPI's, or Slurm's.
-inline int device_of_process(int count) {
-  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_RANK", "SLURM_LOCALID"})
-    if (const char* value = std::getenv(name)) return std::atoi(value) % count;
-  return 0;
-}
-
 /// Memory of the host that a device's copies may read and write while the host goes on, for as long as this
 /// lives.
 class Pinned {
@@ -180,7 +172,7 @@ class Pinned {
   Pinned([[maybe_unused]] Place place, [[maybe_unused]] const void* data,
          [[maybe_unused]] std::size_t bytes) {
 #if defined(HEMOWALK_CUDA)
-    if (place == Place::host || bytes == 0) return;
+    if (place == Place::host || bytes == 0 || !use_device()) return;
     if (cudaHostRegister(const_cast<void*>(data), bytes, cudaHostRegisterDefault) == cudaSuccess)
       data_ = data;
     else
@@ -213,7 +205,8 @@ class Graph {
   std::size_t size_ = 0;
 };
 
-/// Work in order at one Place: a CUDA stream, or plain loops that are done when a call returns.
+/// Work in order at one Place: a CUDA stream, or plain loops that are done when a call returns. Any host
+/// thread may use it, one at a time.
 class Queue {
  public:
   /// \throws InputError when a device is asked for and there is none.
@@ -221,9 +214,7 @@ class Queue {
     if (place == Place::host) return;
     require(device_present(), no_device);
 #if defined(HEMOWALK_CUDA)
-    int count = 1;
-    detail::check(cudaGetDeviceCount(&count), "counting devices");
-    detail::check(cudaSetDevice(device_of_process(count)), "choosing a device");
+    enter();
     detail::check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "creating a stream");
 #endif
   }
@@ -243,6 +234,7 @@ class Queue {
     static_assert(std::is_trivially_copyable_v<Body>, "bodies are copied into the kernel");
     if (n == 0) return;
     ++enqueued_;
+    enter();
     if (place_ == Place::host) return run([n, body] { detail::run_each(n, body); });
 #if defined(__CUDACC__)
     detail::each_kernel<<<static_cast<unsigned>((n + 255) / 256), 256, 0, stream_>>>(n, body);
@@ -258,6 +250,7 @@ class Queue {
     static_assert(std::is_trivially_copyable_v<Body>, "bodies are copied into the kernel");
     if (count == 0) return;
     ++enqueued_;
+    enter();
     const auto n = static_cast<unsigned>(count);
     if (place_ == Place::host)
       return run([n, shared_bytes, body] { detail::run_blocks(n, shared_bytes, body); });
@@ -280,14 +273,33 @@ class Queue {
     static_assert(std::is_trivially_copyable_v<T>);
     if (n == 0) return;
     ++enqueued_;
+    enter();
     if (place_ == Place::host) return run([=] { std::memcpy(static_cast<void*>(to), from, n * sizeof(T)); });
 #if defined(HEMOWALK_CUDA)
     detail::check(cudaMemcpyAsync(to, from, n * sizeof(T), cudaMemcpyDefault, stream_), "a copy");
 #endif
   }
 
+  /// Makes room for \p n elements; what was there stays. The first size fits exactly, an array that grows
+  /// gets room for more. Waits.
+  template <class T>
+  void fit(Array<T>& array, std::size_t n) {
+    if (n <= array.size()) return;
+    Array<T> larger(array.size() == 0 ? n : n + n / 4, place_);
+    copy(larger.data(), array.data(), array.size());
+    wait();
+    array = std::move(larger);
+  }
+  /// The values of \p from at the start of \p to; waits.
+  template <class T>
+  void upload(Array<T>& to, const std::vector<T>& from) {
+    copy(to.data(), from.data(), from.size());
+    wait();
+  }
+
   /// Returns when everything enqueued is done. \throws Error if any of it failed.
   void wait() {
+    enter();
 #if defined(HEMOWALK_CUDA)
     if (place_ == Place::device) detail::check(cudaStreamSynchronize(stream_), "a kernel");
 #endif
@@ -295,6 +307,7 @@ class Queue {
 
   /// From here to end_recording() work is kept instead of done.
   void begin_recording() {
+    enter();
     recording_ = true;
     enqueued_ = 0;
     work_.clear();
@@ -323,6 +336,7 @@ class Queue {
     return graph;
   }
   void replay(const Graph& graph) {
+    enter();
     for (const auto& work : graph.work_) work();
 #if defined(HEMOWALK_CUDA)
     if (graph.executable_)
@@ -355,6 +369,7 @@ class Queue {
     std::shared_ptr<void> event_;
   };
   Moment now() {
+    enter();
     Moment moment;
     moment.wall_ = omp_get_wtime();
 #if defined(HEMOWALK_CUDA)
@@ -370,6 +385,10 @@ class Queue {
   }
 
  private:
+  /// The calling thread's current device may be another one.
+  void enter() const {
+    if (place_ == Place::device) require(use_device(), no_device);
+  }
   template <class Work>
   void run(Work&& work) {
     if (recording_)

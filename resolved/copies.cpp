@@ -26,10 +26,12 @@ int node_of(std::int32_t origin, Real z) {
 }  // namespace
 
 template <class Real>
-Copies<Real>::Copies(const Decomposition& decomposition, double contact_range, std::vector<int> vertices)
+Copies<Real>::Copies(const Decomposition& decomposition, double contact_range, std::vector<int> vertices,
+                     MarkersOfCopies markers)
     : decomposition_(decomposition),
       block_(decomposition.block()),
       range_(contact_range),
+      shared_(markers == MarkersOfCopies::shared),
       vertices_(std::move(vertices)),
       ring_(decomposition, Topic::copies),
       readings_(decomposition, Topic::readings),
@@ -58,7 +60,7 @@ void Copies<Real>::arrange() {
     const std::uint8_t* away = n.away.data();
     for (const std::uint32_t b : n.listed)
       for (int k = 0; k < vertices_[bodies_[b].shape]; ++k)
-        if (*away++) body_of_[bodies_[b].first + k * bodies_[b].stride] = -1;
+        if (*away++ && !shared_) body_of_[bodies_[b].first + k * bodies_[b].stride] = -1;
   }
   bodies_.resize(own_);
   for (Neighbour& n : sides_) {
@@ -76,7 +78,21 @@ void Copies<Real>::arrange() {
 /// the next step (nobody moves by half a node), or have a marker there.
 template <class Real>
 double Copies<Real>::need(const Neighbour& n) const {
-  return range_ < 0 ? 1 : std::max(1.0, n.reach + range_ + 1);
+  const double markers = shared_ ? kernel_reach : 1;
+  return range_ < 0 ? markers : std::max(markers, n.reach + range_ + 1);
+}
+
+template <class Real>
+bool Copies<Real>::unlisted(Side side, View<const Extent> extents) const {
+  const double limit = need(sides_[index_of(side)]);
+  for (std::size_t b = 0; b < own_; ++b)
+    if (!on_list_[index_of(side)][b] && depth(side, extents[b]) < limit) return true;
+  return false;
+}
+
+template <class Real>
+bool Copies<Real>::lists_anew(View<const Extent> extents) const {
+  return anew_ || unlisted(Side::low, extents) || unlisted(Side::high, extents);
 }
 
 /// Whether a marker of a listed body is more than a node outside the block it was counted to.
@@ -109,14 +125,13 @@ int Copies<Real>::choose(Side side, View<const Extent> extents, View<const ibm::
   std::vector<std::uint8_t>& on_list = on_list_[index_of(side)];
   const double limit = need(n);
   n.leaving = false;
-  bool unlisted = anew_;
   for (std::size_t b = 0; b < own_; ++b) {
-    unlisted = unlisted || (!on_list[b] && depth(side, extents[b]) < limit);
     const int z = origin[b][2];
     n.leaving = n.leaving || (side == Side::low ? z < -1 : z > block_.nz);
   }
-  if (!unlisted && !strayed(side, origin, sites)) return 0;
-  if (unlisted) {
+  const bool anew = anew_ || unlisted(side, extents);
+  if (!anew && (shared_ || !strayed(side, origin, sites))) return 0;
+  if (anew) {
     n.listed.clear();
     for (std::size_t b = 0; b < own_; ++b) {
       on_list[b] = depth(side, extents[b]) < limit + margin;
@@ -127,10 +142,11 @@ int Copies<Real>::choose(Side side, View<const Extent> extents, View<const ibm::
   for (const std::uint32_t b : n.listed) {
     const contact::Body& body = bodies_[b];
     for (int k = 0; k < vertices_[body.shape]; ++k)
-      n.away.push_back(is_away(side, node_of(origin[b][2], sites[body.first + k * body.stride].z)));
+      n.away.push_back(shared_ ||
+                       is_away(side, node_of(origin[b][2], sites[body.first + k * body.stride].z)));
   }
   index(n);
-  return unlisted ? 2 : 1;
+  return anew ? 2 : 1;
 }
 
 template <class Real>
@@ -291,7 +307,7 @@ template <class Real>
 void Copies<Real>::check_reach() const {
   const double low = sides_[0].reach, high = sides_[1].reach, most = std::max(low, high);
   const bool meet = range_ >= 0 && low + high + range_ > block_.nz;
-  require(!meet && most <= block_.nz - 1, [&] {
+  require(!meet && most <= block_.nz - (shared_ ? kernel_reach : 1), [&] {
     return formatted(
         "cells reach %.1f and %.1f planes into a slab of %d (they would touch beyond it, unseen by their "
         "own ranks) use fewer ranks",
@@ -340,7 +356,9 @@ void Copies<Real>::receive_readings(View<Node4<Real>> reading) {
   readings_.wait();
   for (const Neighbour& n : sides_)
     for_own(n, [&](std::size_t slot, std::size_t at) {
-      reading[slot] = {n.there[3 * at], n.there[3 * at + 1], n.there[3 * at + 2], Real(0)};
+      const Node4<Real> v{n.there[3 * at], n.there[3 * at + 1], n.there[3 * at + 2], Real(0)};
+      Node4<Real>& here = reading[slot];
+      here = shared_ ? Node4<Real>{here.x + v.x, here.y + v.y, here.z + v.z, Real(0)} : v;
     });
 }
 

@@ -5,6 +5,9 @@
 ///
 /// Which cells and which markers is decided by the owner and kept until a cell comes near or a marker strays
 /// by more than a node: positions travel in every step, lists seldom.
+///
+/// Devices share markers instead: both ranks interpolate and spread all markers of a copied cell, each for
+/// the nodes of its own block, so that readings are added up and nothing but bodies is listed.
 
 #include <cstdint>
 #include <vector>
@@ -22,11 +25,14 @@ struct Extent {
   double low, high;
 };
 
+enum class MarkersOfCopies { divided, shared };
+
 template <class Real>
 class Copies {
  public:
   /// \param contact_range dx, negative: no contact. \param vertices of a body of each shape.
-  Copies(const Decomposition& decomposition, double contact_range, std::vector<int> vertices);
+  Copies(const Decomposition& decomposition, double contact_range, std::vector<int> vertices,
+         MarkersOfCopies markers = MarkersOfCopies::divided);
 
   /// The bodies of this rank from now on, in \p slots marker slots: cells came or went. Lists are made anew.
   void set_bodies(std::vector<contact::Body> own, std::size_t slots);
@@ -36,6 +42,10 @@ class Copies {
   /// [slot] body of the markers that this rank interpolates and spreads, else negative.
   const std::vector<std::int32_t>& body_of() const { return body_of_; }
   std::size_t slots() const { return body_of_.size(); }
+  /// Own bodies that the neighbour has copies of.
+  const std::vector<std::uint32_t>& listed(Side side) const { return sides_[index_of(side)].listed; }
+  /// Will the next exchange() list bodies anew, and so read vertices and sites of any of them?
+  bool lists_anew(View<const Extent> extents) const;
 
   struct Change {
     bool markers = false;  ///< other markers lie here
@@ -49,7 +59,7 @@ class Copies {
   /// Positions of the copies, behind those of the own bodies: arrays of bodies().size() and slots().
   void place(View<ibm::Origin> origin, View<Node4<Real>> vertices, View<Node4<Real>> sites) const;
 
-  /// What was interpolated for the neighbours' markers goes back to them.
+  /// What was interpolated for the neighbours' markers goes back to them; shared markers: adds up there.
   void send_readings(View<const Node4<Real>> reading);
   void receive_readings(View<Node4<Real>> reading);
   /// Impulses of the own markers that lie in a neighbour's slab go there.
@@ -60,6 +70,9 @@ class Copies {
   /// or that one, found a centre more than a node outside.
   bool leaving(Side side) const { return sides_[index_of(side)].leaving; }
   bool arriving(Side side) const { return sides_[index_of(side)].arriving; }
+  bool passing() const {
+    return leaving(Side::low) || leaving(Side::high) || arriving(Side::low) || arriving(Side::high);
+  }
   /// An own body is now the neighbour's: its surface may reach back by so much.
   void gave_away(Side side, const Extent& extent);
 
@@ -100,6 +113,7 @@ class Copies {
   double need(const Neighbour& n) const;
   void exchange_reach(View<const Extent> extents);
   bool is_away(Side side, int node) const { return side == Side::low ? node < 0 : node >= block_.nz; }
+  bool unlisted(Side side, View<const Extent> extents) const;
   int choose(Side side, View<const Extent> extents, View<const ibm::Origin> origin,
              View<const Node4<Real>> sites);
   bool strayed(Side side, View<const ibm::Origin> origin, View<const Node4<Real>> sites) const;
@@ -115,10 +129,13 @@ class Copies {
   void for_copies(const Neighbour& n, const Body& body) const;
 
   static constexpr double margin = 2;  ///< dx by which lists look ahead
+  /// Nodes between a marker and the farthest node of its kernel, and one to move.
+  static constexpr int kernel_reach = 3;
 
   Decomposition decomposition_;
   Block block_;
   double range_;
+  bool shared_;
   std::vector<int> vertices_;
   std::size_t own_ = 0, own_slots_ = 0;
   std::vector<contact::Body> bodies_;

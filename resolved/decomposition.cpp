@@ -30,10 +30,8 @@ int Decomposition::shift_to(Side side) const {
 }
 
 double Decomposition::localise(double k) const {
-  // The domain's periodic image that has this block in its middle.
-  const double n = whole_.nz, lowest = divided() ? (block_.nz - whole_.nz) / 2 : 0;
   const double plane = k - first_plane();
-  return plane - std::floor((plane - lowest) / n) * n;
+  return plane - std::floor((plane - lowest_seen()) / whole_.nz) * whole_.nz;
 }
 
 template <class Real>

@@ -38,6 +38,8 @@ class Decomposition {
   int neighbour(Side side) const {
     return (ranks_.rank() + (side == Side::low ? ranks_.count() - 1 : 1)) % ranks_.count();
   }
+  /// First plane, counted from this block's, of the domain's periodic image that has the block in its middle.
+  double lowest_seen() const { return divided() ? (block_.nz - whole_.nz) / 2 : 0; }
   /// Plane \p k of the domain (any periodic image), as seen from this block: in the image nearest to it.
   double localise(double k) const;
 

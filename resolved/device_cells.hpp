@@ -31,7 +31,8 @@ struct CellCoupling {
   Real half_body_force[3], h, delta;
   Real force_grain;  ///< contact forces are multiples of this
   std::uint32_t first_slot, first_body;
-  int nodes[3];  ///< of the block; 0 along an axis that is not periodic
+  int nodes[3];                ///< of the domain; 0 along an axis that is not periodic
+  double first[3], lowest[3];  ///< of the block in it; lowest node of the image to be seen, from there
 
   Node4<Real>* reading;               ///< [slot] I[u* + theta F/2]; then w
   Node4<Real>* impulse;               ///< [slot]
@@ -143,7 +144,8 @@ struct CellCoupling {
                    whole = std::floor(a);
       fraction[d] = static_cast<Real>(a - whole);
       if (me != 0) continue;
-      double node = nodes[d] > 0 ? whole - std::floor(whole / nodes[d]) * nodes[d] : whole;
+      double node = whole - first[d];
+      if (nodes[d] > 0) node -= std::floor((node - lowest[d]) / nodes[d]) * nodes[d];
       if (!(node > -1e6 && node < 1e6)) node = 0;  // blown up: the markers will tell
       origin[3 * (first_body + static_cast<std::size_t>(cell)) + static_cast<std::size_t>(d)] =
           static_cast<std::int32_t>(node);

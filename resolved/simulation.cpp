@@ -194,19 +194,24 @@ void Simulation<Real>::move_cells() {
   }
 }
 
-/// Positions of the own cells to the neighbours, theirs to here; markers and bodies anew where the lists
-/// changed.
 template <class Real>
-void Simulation<Real>::share_positions() {
+void Simulation<Real>::check_lengths(View<const Extent> extents) const {
   for (const auto& group : groups_)
     for (int c = 0; c < group.count() && decomposition_.divided(); ++c) {
-      const Extent& e = extent_[group.first_body + c];
+      const Extent& e = extents[group.first_body + c];
       if (e.high - e.low < decomposition_.whole().nz) continue;
       const auto id = std::visit([&](const auto& g) { return g.id(c); }, group.cells);
       throw PhysicsError("cell " + std::to_string(id) + " (" + scene_.cells.kinds[group.kind].name +
                          ") is longer than the box at step " + std::to_string(fluid_steps_) +
                          " (blow-up) lower the acceleration or raise coupling.iterations");
     }
+}
+
+/// Positions of the own cells to the neighbours, theirs to here; markers and bodies anew where the lists
+/// changed.
+template <class Real>
+void Simulation<Real>::share_positions() {
+  check_lengths(std::as_const(extent_).view());
   const auto change =
       copies_->exchange({extent_.data(), bodies_}, origin_.view(), vertices_.view(), sites_.view());
   if (change.markers) {
@@ -299,7 +304,7 @@ template <class Real>
 void Simulation<Real>::find_cells() {
   {
     Stopwatch watch(timings_.communication);
-    hand_over();
+    hand_over(*copies_);
   }
   {
     Stopwatch watch(timings_.interpolation);
@@ -430,6 +435,8 @@ lbm::Totals Simulation<Real>::totals() const {
 template <class Real>
 double Simulation<Real>::slip_rms() {
   if (!any_cells_) return 0;
+  // Where the whole step is elsewhere the markers here do not follow the cells.
+  if (scene_.place.fluid == Place::device) return std::numeric_limits<double>::quiet_NaN();
   // Of the coupling points against u = u* + F/2 there; velocity_ holds u* + theta/2 F.
   Array<Node4<Real>> u(copies_->slots()), f(copies_->slots());
   read_field(velocity_.view(), u.view());

@@ -141,7 +141,7 @@ class Simulation {
   /// Of the whole fluid (all).
   lbm::Totals totals() const;
   /// Root mean square over all membrane markers of |v - I[u]|, u = u* + F/2 after the step; costs an
-  /// interpolation (all).
+  /// interpolation (all). NaN where the whole step is on a device.
   double slip_rms();
   const mesh::StepReport& solid_report() const { return solid_report_; }
   Timings& timings() { return timings_; }
@@ -183,7 +183,8 @@ class Simulation {
   }
   void stream_and_collide(Real force_share);
   void advance_fluid(Real force_share);
-  void hand_over();
+  void hand_over(Copies<Real>& copies);
+  void check_lengths(View<const Extent> extents) const;
   // The three couplings, coupling_*.cpp: cells move by h_, the fluid gets force_ (docs/adr/0011).
   void couple_conservative();
   void retract();

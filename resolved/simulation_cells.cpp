@@ -219,10 +219,8 @@ Impulses<Real> impulses_of(const Group<Real>& group, const Array<Node4<Real>>& i
 /// Cells whose centre is a node or more outside the slab go to the neighbour that holds it, whole; with them
 /// go those that are outside at all, so that this happens seldom.
 template <class Real>
-void Simulation<Real>::hand_over() {
-  bool any = false;
-  for (const Side side : both_sides) any = any || copies_->leaving(side) || copies_->arriving(side);
-  if (!any) return;
+void Simulation<Real>::hand_over(Copies<Real>& copies) {
+  if (!copies.passing()) return;
   if (solid_.give_back) solid_.give_back();
   read_positions();
   std::vector<Impulses<Real>> impulses;
@@ -240,12 +238,12 @@ void Simulation<Real>::hand_over() {
             const auto body = static_cast<std::size_t>(group.first_body + c);
             for (const Side side : both_sides) {
               const int z = origin_[body][2];
-              if (!copies_->leaving(side) || (side == Side::low ? z >= 0 : z < block_.nz)) continue;
+              if (!copies.leaving(side) || (side == Side::low ? z >= 0 : z < block_.nz)) continue;
               std::vector<std::byte>& out = outgoing[index_of(side)];
               g.save(c, state.data());
               put(out, &number, 1), put(out, state.data(), state.size());
               put(out, of_group.data() + c * length, length);
-              copies_->gave_away(side, extent_[body]);
+              copies.gave_away(side, extent_[body]);
               g.remove(c);
               std::copy(of_group.end() - length, of_group.end(), of_group.begin() + c * length);
               of_group.resize(of_group.size() - length);
@@ -256,12 +254,12 @@ void Simulation<Real>::hand_over() {
         group.cells);
   }
   for (const Side side : both_sides)
-    if (copies_->leaving(side)) {
+    if (copies.leaving(side)) {
       const auto& out = outgoing[index_of(side)];
       handing_over_.send(side, out.data(), out.size());
     }
   for (const Side side : both_sides) {
-    if (!copies_->arriving(side)) continue;
+    if (!copies.arriving(side)) continue;
     handing_over_.receive(side, incoming);
     for (Reader in({incoming.data(), incoming.size()}); !in.at_end(); ++arrivals_) {
       const auto number = in.take<std::int32_t>().at(0);
@@ -290,12 +288,12 @@ template void Simulation<float>::find_loads(const std::vector<InitialCell>&);
 template void Simulation<float>::build_coupling();
 template void Simulation<float>::arrange();
 template void Simulation<float>::fit_arrays();
-template void Simulation<float>::hand_over();
+template void Simulation<float>::hand_over(Copies<float>&);
 template void Simulation<double>::build_groups(const std::vector<InitialCell>&);
 template void Simulation<double>::find_loads(const std::vector<InitialCell>&);
 template void Simulation<double>::build_coupling();
 template void Simulation<double>::arrange();
 template void Simulation<double>::fit_arrays();
-template void Simulation<double>::hand_over();
+template void Simulation<double>::hand_over(Copies<double>&);
 
 }  // namespace hemowalk::resolved

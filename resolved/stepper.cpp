@@ -36,9 +36,6 @@ Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
       simulation.scene().coupling.integrator == data::Coupling::Integrator::implicit,
       "coupling.integrator runge_kutta on the device (its kernels know the implicit step) use place: host");
   if (place.fluid == Place::device) {
-    require(simulation.ranks().count() == 1,
-            "place: device on several ranks (the device's fluid and markers know one block) use one rank, "
-            "place: {solid: device}, or place: host");
     impl_->whole = std::make_unique<DeviceSimulation<Real>>(impl_->queue, simulation);
   } else {
     impl_->solid = std::make_unique<DeviceSolid<Real>>(device, simulation.groups());

@@ -2,6 +2,9 @@
 if(TARGET hemowalk)
   hemowalk_test(test_holdout_walk SOURCES integration/test_holdout_walk.cpp LINK hemowalk_workflow LABELS integration)
   hemowalk_test(test_cli_json SOURCES integration/test_cli_json.cpp LINK hemowalk_workflow LABELS integration)
+  hemowalk_test(test_local_launcher SOURCES integration/test_local_launcher.cpp LINK hemowalk_workflow LABELS integration)
+  set_tests_properties(test_local_launcher PROPERTIES ENVIRONMENT
+    "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1")
   hemowalk_test(test_report SOURCES integration/test_report.cpp LINK hemowalk_workflow LABELS integration)
   hemowalk_test(test_cli_calibrate SOURCES integration/test_cli_calibrate.cpp LINK hemowalk_workflow LABELS integration)
   foreach(test test_cli_json test_cli_calibrate test_report)

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "core/check.hpp"
+#include "core/device_choice.hpp"
 #include "core/log.hpp"
 #include "core/progress.hpp"
 #include "workflow/process.hpp"
@@ -29,6 +30,7 @@ struct Active {
   clock::time_point started;
   std::unique_ptr<Child> child;
   int tries;
+  int slot;  ///< among those that run at the same time
   bool out_of_time = false, told_to_stop = false;
 };
 
@@ -139,12 +141,22 @@ class Pool {
     std::vector<std::string> arguments = launcher_;
     arguments.insert(arguments.end(), {this_program(), "resolve", job.folder + "/scene.yaml", "--out",
                                        job.folder, "--resume"});
-    active_.push_back({j, clock::now(),
-                       std::make_unique<Child>(
-                           arguments, job.folder + "/log.txt",
-                           std::map<std::string, std::string>{{"OMP_NUM_THREADS", std::to_string(threads_)}},
-                           stop_signal()),
-                       tries + 1});
+    const int slot = free_slot();
+    // Runs that are under way together start at devices of their own, where there are enough.
+    const int device = first_device_of_run() + slot * std::max(1, options_.ranks);
+    const std::map<std::string, std::string> environment{{"OMP_NUM_THREADS", std::to_string(threads_)},
+                                                         {"HEMOWALK_DEVICE", std::to_string(device)}};
+    active_.push_back(
+        {j, clock::now(),
+         std::make_unique<Child>(arguments, job.folder + "/log.txt", environment, stop_signal()), tries + 1,
+         slot});
+  }
+
+  /// Lowest number that no run under way has.
+  int free_slot() const {
+    for (int slot = 0;; ++slot)
+      if (std::none_of(active_.begin(), active_.end(), [slot](const Active& a) { return a.slot == slot; }))
+        return slot;
   }
 
   void look_after(std::size_t k) {

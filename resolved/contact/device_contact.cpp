@@ -44,34 +44,41 @@ DeviceContact<Real>::DeviceContact(Queue& queue, const Law& law, const Domain& d
                        static_cast<std::uint32_t>(topology[i].vertices()),
                        static_cast<std::uint32_t>(topology[i].triangles.size())});
   surface_ = make_array(place, surface);
+  for (const Surface& each : surface) vertices_.push_back(each.vertices);
+  stale_ = make_array(place, std::vector<unsigned>{1});
+  tally_ = Array<Tally>(1, place);
+  assign(shape_of, shape_of.size(), load);
+}
+
+template <class Real>
+void DeviceContact<Real>::assign(const std::vector<std::uint16_t>& shape_of, std::size_t own,
+                                 const std::vector<std::array<double, 3>>& load) {
   std::vector<std::uint32_t> shape, first;
   std::vector<std::int32_t> body;
   for (const std::uint16_t s : shape_of) {
-    require(s < shapes.size(),
+    require(s < vertices_.size(),
             "contact: body of unknown shape (" + std::to_string(s) + ") give a shape for every kind of cell");
     const auto b = static_cast<std::int32_t>(shape.size());
     shape.push_back(s), first.push_back(static_cast<std::uint32_t>(body.size()));
-    body.insert(body.end(), surface[s].vertices, b);
+    body.insert(body.end(), vertices_[s], b);
   }
   require(shape.size() < (std::size_t{1} << 26),
           "too many bodies for one device (their number shares a word with the "
           "image) split the domain");
   slots_ = static_cast<std::uint32_t>(body.size());
-  shape_ = make_array(place, shape), first_ = make_array(place, first), body_ = make_array(place, body);
-  count_ = Array<std::uint32_t>(slots_, place);
-  reference_origin_ = Array<Origin>(slots_, place);
-  reference_ = Array<Node4<Real>>(slots_, place);
-  stale_ = make_array(place, std::vector<unsigned>{1});  // nothing was searched yet
-  near_ = Array<Near>(static_cast<std::size_t>(capacity) * slots_, place);
-  force_ = Array<std::int64_t>(3 * static_cast<std::size_t>(slots_), place);
-  tally_ = Array<Tally>(1, place);
-  if (!load.empty()) {
-    require(load.size() == slots_, "loads need one force per vertex");
-    std::vector<std::int64_t> grains;
-    for (const auto& f : load)
-      for (const double component : f) grains.push_back(to_grains(component));
-    load_ = make_array(place, grains);
-  }
+  own_ = static_cast<std::int32_t>(own);
+  loaded_ = !load.empty();
+  require(!loaded_ || load.size() == slots_, "loads need one force per vertex");
+  std::vector<std::int64_t> grains;
+  for (const auto& f : load)
+    for (const double component : f) grains.push_back(to_grains(component));
+  queue_.fit(shape_, shape.size()), queue_.fit(first_, first.size()), queue_.fit(body_, body.size());
+  queue_.fit(count_, slots_), queue_.fit(reference_origin_, slots_), queue_.fit(reference_, slots_);
+  queue_.fit(near_, static_cast<std::size_t>(capacity_) * slots_);
+  queue_.fit(force_, 3 * static_cast<std::size_t>(slots_)), queue_.fit(load_, grains.size());
+  queue_.upload(shape_, shape), queue_.upload(first_, first), queue_.upload(body_, body);
+  queue_.upload(load_, grains);
+  queue_.upload(stale_, std::vector<unsigned>{1});  // nothing was searched yet
 }
 
 template <class Real>
@@ -79,6 +86,7 @@ void DeviceContact<Real>::compute(const Origin* origin, const Node4<Real>* local
   const Crowd<Real> crowd{law_,
                           domain_,
                           slots_,
+                          own_,
                           capacity_,
                           surface_.data(),
                           shape_.data(),
@@ -92,7 +100,7 @@ void DeviceContact<Real>::compute(const Origin* origin, const Node4<Real>* local
                           count_.data(),
                           near_.data(),
                           force_.data(),
-                          load_.size() ? load_.data() : nullptr,
+                          loaded_ ? load_.data() : nullptr,
                           tally_.data()};
   queue_.for_each(slots_, StartForces<Real>{crowd});
   if (law_.stiffness <= 0) return;

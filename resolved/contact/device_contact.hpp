@@ -17,6 +17,11 @@ class DeviceContact {
                 const std::vector<std::uint16_t>& shape_of,
                 const std::vector<std::array<double, 3>>& load = {}, int capacity = 48);
 
+  /// Other bodies from now on, the first \p own of them owned, the others neighbours' copies. Lists are
+  /// searched anew. Memory only grows; graphs that were recorded before are void.
+  void assign(const std::vector<std::uint16_t>& shape_of, std::size_t own,
+              const std::vector<std::array<double, 3>>& load);
+
   /// Enqueues: forces()[slot] = contact force + load. \p bins: the slots by bin, of positions at most
   /// bins.slack away from these.
   void compute(const Origin* origin, const Node4<Real>* local, const BinView& bins);
@@ -39,6 +44,9 @@ class DeviceContact {
   Domain domain_;
   int capacity_;
   std::uint32_t slots_ = 0;
+  std::int32_t own_ = 0;
+  bool loaded_ = false;
+  std::vector<std::uint32_t> vertices_;  ///< [shape]
   Array<Triangle3> triangles_;
   Array<std::uint32_t> ring_begin_, ring_, shape_, first_, count_;
   Array<double> area_;

@@ -76,6 +76,7 @@ struct Crowd {
   Law law;
   Domain domain;
   std::uint32_t slots;
+  std::int32_t own;                    ///< bodies from this one on are neighbours' copies (see Body::owned)
   int capacity;                        ///< entries per slot
   const Surface* surface;              ///< [shape]
   const std::uint32_t *shape, *first;  ///< [body] shape, first slot
@@ -173,6 +174,7 @@ struct MeasureEdges {
 struct BinView {
   Block block;
   bool walls_y;
+  int beyond;                   ///< nodes with bins below and above a block divided along z; 0: periodic
   int edge, x, y, z;            ///< nodes per bin, bins along the axes
   const std::uint32_t* begin;   ///< [bins + 1]
   const std::uint32_t* listed;  ///< slots by bin
@@ -200,6 +202,17 @@ struct FindNear {
     return {{lo, 0}, {n - 1, hi - n}, 2};
   }
 
+  /// Along z on a divided block, counted from the first node with a bin: what lies beyond the bins is in the
+  /// outermost ones.
+  HEMO_HD Stretches along_divided_z(double low, double high) const {
+    const int last = bins.block.nz + 2 * bins.beyond - 1;
+    const auto clamp = [last, this](double node) {
+      const int k = static_cast<int>(std::floor(node)) + bins.beyond;
+      return k < 0 ? 0 : k > last ? last : k;
+    };
+    return {{clamp(low), 0}, {clamp(high), 0}, 1};
+  }
+
   HEMO_HD void operator()(std::size_t index) const {
     if (*s.stale == 0) return;
     const auto me = static_cast<std::uint32_t>(index);
@@ -217,7 +230,8 @@ struct FindNear {
     const Block& block = bins.block;
     const Stretches sx = stretches(x[0] - 0.5 - reach, x[0] + reach, block.nx, true, bins.edge),
                     sy = stretches(x[1] - 0.5 - reach, x[1] + reach, block.ny, !bins.walls_y, bins.edge),
-                    sz = stretches(x[2] - 0.5 - reach, x[2] + reach, block.nz, true, bins.edge);
+                    sz = bins.beyond ? along_divided_z(x[2] - 0.5 - reach, x[2] + reach)
+                                     : stretches(x[2] - 0.5 - reach, x[2] + reach, block.nz, true, bins.edge);
     std::uint32_t found = 0;
     const int off = bins.walls_y ? 1 : 0;
     for (int c = 0; c < sz.count; ++c)
@@ -242,6 +256,7 @@ struct FindNear {
   HEMO_HD void look(std::uint32_t me, std::uint32_t other, Real radius2, Real within2,
                     std::uint32_t& found) const {
     const std::int32_t mine = s.body[me], theirs = s.body[other];
+    if (mine >= s.own && theirs >= s.own) return;  // their own ranks see to that
     int w[3];
     s.image(me, other, w);
     if (theirs == mine && w[0] == 0 && w[1] == 0 && w[2] == 0) return;
@@ -353,8 +368,10 @@ struct PressVertices {
     const double area = s.surface[s.shape[mine]].area[me - s.first[mine]];
     const Potential<Real> potential{Real(s.law.range), Real(0.5 * s.law.stiffness * area)};
     const Point<Real> push = potential.force(gap) * normal;
-    atomic_add(&s.tally->contacts, 1u);
-    atomic_add(&s.tally->energy, to_grains(static_cast<double>(potential.energy(gap))));
+    if (mine < s.own) {  // copies are counted where they live
+      atomic_add(&s.tally->contacts, 1u);
+      atomic_add(&s.tally->energy, to_grains(static_cast<double>(potential.energy(gap))));
+    }
     atomic_min(&s.tally->gap, ordered(static_cast<float>(gap)));
     const Triangle3 c = surface.triangles[t];
     const Real part[3] = {push.x, push.y, push.z};
@@ -372,6 +389,7 @@ struct PressVertices {
   HEMO_HD void press_wall(std::uint32_t me) const {
     if (s.domain.walls.geometry == Walls::Geometry::none) return;
     const std::int32_t b = s.body[me];
+    if (b >= s.own) return;
     const WallGap<Real> wall = WallGaps<Real>(s.domain.walls, s.origin[b])(s.point(me));
     if (wall.gap >= Real(s.law.range)) return;
     const double area = s.surface[s.shape[b]].area[me - s.first[b]];

@@ -4,7 +4,9 @@
 /// is summed by one thread, in that order.
 ///
 /// Bins are cubes of bin_edge nodes; "node" means the node left of a marker, wrapped into the period; along
-/// an axis with walls it lies in [-1, n - 1]. The 4 x 4 x 4 kernel begins at node - 1.
+/// an axis with walls it lies in [-1, n - 1]. The 4 x 4 x 4 kernel begins at node - 1. A block divided along
+/// z has bins beyond its ends too, for markers that reach into it and for who looks for neighbours (contact);
+/// what lies still farther shares the outermost bins.
 
 #include "core/block.hpp"
 #include "core/device.hpp"
@@ -22,15 +24,16 @@ inline constexpr int tile_edge = 8;
 struct Bins {
   Block block;
   bool walls_y;
+  int beyond;   ///< nodes with bins below and above a block that is divided along z; 0: periodic
   int x, y, z;  ///< bins along the axes
   int tiles_x, tiles_y, tiles_z;
 
   HEMO_HD static int ceil_div(int a, int b) { return (a + b - 1) / b; }
-  HEMO_HD static Bins make(const Block& block, bool walls_y) {
-    Bins b{block, walls_y, 0, 0, 0, 0, 0, 0};
+  HEMO_HD static Bins make(const Block& block, bool walls_y, bool divided_z) {
+    Bins b{block, walls_y, divided_z ? 16 : 0, 0, 0, 0, 0, 0, 0};
     b.x = ceil_div(block.nx, bin_edge);
     b.y = ceil_div(block.ny + (walls_y ? 1 : 0), bin_edge);
-    b.z = ceil_div(block.nz, bin_edge);
+    b.z = ceil_div(block.nz + 2 * b.beyond, bin_edge);
     b.tiles_x = ceil_div(block.nx, tile_edge);
     b.tiles_y = ceil_div(block.ny + (walls_y ? 4 : 0), tile_edge);
     b.tiles_z = ceil_div(block.nz, tile_edge);
@@ -44,8 +47,19 @@ struct Bins {
            static_cast<std::size_t>(tiles_z);
   }
   HEMO_HD int bin_y(int node) const { return (node + (walls_y ? 1 : 0)) / bin_edge; }
-  HEMO_HD std::uint32_t bin(int i, int by, int k) const {
-    return static_cast<std::uint32_t>((k / bin_edge * y + by) * x + i / bin_edge);
+  /// Node along z, wrapped or, on a divided block, at most a little beyond the bins: nothing reaches from
+  /// there.
+  HEMO_HD int node_z(int node) const {
+    if (!beyond) return node < 0 || node >= block.nz ? ((node % block.nz) + block.nz) % block.nz : node;
+    const int low = -2 * beyond, high = block.nz + 2 * beyond;
+    return node < low ? low : node > high ? high : node;
+  }
+  HEMO_HD int bin_z(int node) const {
+    const int k = node + beyond, last = block.nz + 2 * beyond - 1;
+    return (k < 0 ? 0 : k > last ? last : k) / bin_edge;
+  }
+  HEMO_HD std::uint32_t bin(int i, int by, int bz) const {
+    return static_cast<std::uint32_t>((bz * y + by) * x + i / bin_edge);
   }
   /// First node of a tile along y: two rows beyond a wall belong to tiles too, they hold the wall's share.
   HEMO_HD int tile_y(int t) const { return t * tile_edge - (walls_y ? 2 : 0); }
@@ -87,7 +101,7 @@ HEMO_HD inline NodeOfMarker<Real> node_of_marker(const Bins& bins, const std::in
   const bool inside = !bins.walls_y || (y.node >= -1 && y.node < bins.block.ny);
   return {wrap(x.node, bins.block.nx),
           bins.walls_y ? (inside ? y.node : 0) : wrap(y.node, bins.block.ny),
-          wrap(z.node, bins.block.nz),
+          bins.node_z(z.node),
           x.fraction,
           y.fraction,
           z.fraction,
@@ -108,7 +122,7 @@ struct CountMarkers {
   HEMO_HD void operator()(std::size_t m) const {
     const auto at = node_of_marker(bins, reinterpret_cast<const std::int32_t*>(origin + body[m]), site[m]);
     if (!at.good) atomic_min(&fault->marker, static_cast<int>(m));
-    bin[m] = bins.bin(at.i, bins.bin_y(at.j), at.k);
+    bin[m] = bins.bin(at.i, bins.bin_y(at.j), bins.bin_z(at.k));
     place[m] = atomic_add(count + bin[m], 1);
   }
 };
@@ -197,8 +211,8 @@ struct PlaceMarkers {
   }
 };
 
-/// out[m] = sum over nodes of phi(x - X_m) field(x). Four threads per marker, one per column of nodes along
-/// x: a warp reads whole rows of 64 bytes.
+/// out[m] = sum over nodes of phi(x - X_m) field(x); zero where the kernel lies beyond the field along z.
+/// Four threads per marker, one per column of nodes along x: a warp reads whole rows of 64 bytes.
 template <class Real>
 struct Interpolate {
   static constexpr int threads = 128;
@@ -216,6 +230,10 @@ struct Interpolate {
     if (p >= count) return;
     const Placed<Real>& m = placed[p];
     if (phase == 0) {
+      if (m.k < -Block::halo || m.k + 4 > block.nz + Block::halo) {
+        part[at.thread] = {Real(0), Real(0), Real(0), Real(0)};
+        return;
+      }
       const std::size_t row = block.row(), plane = block.plane();
       const Node4<Real>* base = field + block.at(m.i, m.j, m.k) + a;
       Node4<Real> sum{Real(0), Real(0), Real(0), Real(0)};
@@ -266,10 +284,10 @@ struct Spread {
     const int i0 = t % bins.tiles_x * tile_edge, j0 = bins.tile_y(t / bins.tiles_x % bins.tiles_y),
               k0 = t / bins.tiles_x / bins.tiles_y * tile_edge;
     const Block& block = bins.block;
-    for (int sz = -block.nz; sz <= block.nz; sz += block.nz) {
-      const Range z = nodes(k0, sz, 0, block.nz);
+    for (int sz = bins.beyond ? 0 : -block.nz; sz <= (bins.beyond ? 0 : block.nz); sz += block.nz) {
+      const Range z = nodes(k0, sz, -bins.beyond, block.nz + bins.beyond);
       if (z.first > z.last) continue;
-      for (int bz = z.first / bin_edge; bz <= z.last / bin_edge; ++bz)
+      for (int bz = bins.bin_z(z.first); bz <= bins.bin_z(z.last); ++bz)
         for (int sy = bins.walls_y ? 0 : -block.ny; sy <= (bins.walls_y ? 0 : block.ny); sy += block.ny) {
           const Range y = nodes(j0, sy, bins.walls_y ? -1 : 0, block.ny);
           if (y.first > y.last) continue;

@@ -10,29 +10,33 @@ template <class Real>
 DeviceMarkers<Real>::DeviceMarkers(Queue& queue, const Block& block, const Faces& faces, Kernel kernel,
                                    const std::vector<std::int32_t>& body_of)
     : queue_(queue),
-      bins_(Bins::make(block, !faces.periodic_y)),
+      bins_(Bins::make(block, !faces.periodic_y, !faces.periodic_z)),
       kernel_(kernel),
-      body_(make_array(queue.place(), body_of)),
       count_(bins_.count(), queue.place()),
       begin_(bins_.count() + 1, queue.place()),
-      bin_(body_of.size(), queue.place()),
-      place_(body_of.size(), queue.place()),
-      listed_(body_of.size(), queue.place()),
-      placed_(body_of.size(), queue.place()),
       fault_(make_array(queue.place(), std::vector<MarkerFault>{{no_fault}})),
       wall_last_(2 * static_cast<std::size_t>(block.nz) * 3, queue.place()),
       wall_total_(2 * static_cast<std::size_t>(block.nz) * 3, queue.place()) {
-  require(faces.periodic_x && faces.periodic_z,
-          "the device's markers need periodic x and z (their tiles wrap)");
-  constexpr int most = std::numeric_limits<std::int16_t>::max() - 8;
+  require(faces.periodic_x, "the device's markers need periodic x (their tiles wrap)");
+  constexpr int most = std::numeric_limits<std::int16_t>::max() - 40;
   require(block.nx < most && block.ny < most && block.nz < most,
-          "a block of more than 32 759 nodes along an axis (a marker's node is 16 bits) split it");
+          "a block of more than 32 727 nodes along an axis (a marker's node is 16 bits) split it");
+  assign(body_of);
+}
+
+template <class Real>
+void DeviceMarkers<Real>::assign(const std::vector<std::int32_t>& body_of) {
   for (const auto b : body_of) require(b >= 0, "the device's markers have no idle slots");
+  markers_ = body_of.size();
+  queue_.fit(body_, markers_);
+  for (auto* array : {&bin_, &place_, &listed_}) queue_.fit(*array, markers_);
+  queue_.fit(placed_, markers_);
+  queue_.upload(body_, body_of);
 }
 
 template <class Real>
 void DeviceMarkers<Real>::locate(const Origin* origin, const Node4<Real>* site) {
-  const std::size_t n = body_.size();
+  const std::size_t n = markers_;
   queue_.for_each(n, CountMarkers<Real>{bins_, body_.data(), origin, site, count_.data(), bin_.data(),
                                         place_.data(), fault_.data()});
   queue_.blocks(1, ScanBins::shared_bytes(),
@@ -44,7 +48,7 @@ void DeviceMarkers<Real>::locate(const Origin* origin, const Node4<Real>* site) 
 
 template <class Real>
 void DeviceMarkers<Real>::interpolate(const Node4<Real>* field, Node4<Real>* out) {
-  const std::size_t n = body_.size();
+  const std::size_t n = markers_;
   queue_.blocks((4 * n + Interpolate<Real>::threads - 1) / Interpolate<Real>::threads,
                 Interpolate<Real>::shared_bytes(),
                 Interpolate<Real>{bins_.block, static_cast<std::uint32_t>(n), placed_.data(), field, out});

@@ -11,9 +11,14 @@ namespace hemowalk::ibm {
 template <class Real>
 class DeviceMarkers {
  public:
-  /// \p body_of: the body of each marker, >= 0.
+  /// \p body_of: the body of each marker, >= 0. On a block divided along z each of its nodes counts once, for
+  /// markers within and beyond it: readings and forces of all blocks add up to the whole, where the field's
+  /// halo along z is zero.
   DeviceMarkers(Queue& queue, const Block& block, const Faces& faces, Kernel kernel,
                 const std::vector<std::int32_t>& body_of);
+
+  /// Another set of markers from now on. Memory only grows; graphs that were recorded before are void.
+  void assign(const std::vector<std::int32_t>& body_of);
 
   // All of these enqueue work; the arrays are at the queue's place.
 
@@ -31,7 +36,7 @@ class DeviceMarkers {
   /// Waits.
   std::array<std::array<double, 3>, 2> wall_force() const { return sum(wall_last_); }
   std::array<std::array<double, 3>, 2> wall_impulse() const { return sum(wall_total_); }
-  std::size_t count() const { return body_.size(); }
+  std::size_t count() const { return markers_; }
   std::size_t memory_bytes() const;
 
   // For kernels that look for neighbours.
@@ -46,6 +51,7 @@ class DeviceMarkers {
   Queue& queue_;
   Bins bins_;
   Kernel kernel_;
+  std::size_t markers_ = 0;
   Array<std::int32_t> body_;
   Array<std::uint32_t> count_, begin_, bin_, place_, listed_;
   Array<Placed<Real>> placed_;

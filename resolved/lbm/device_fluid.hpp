@@ -9,15 +9,27 @@
 namespace hemowalk::lbm {
 
 /// D3Q19 fluid in place (AA pattern), one thread per node. Bits do not depend on the order of threads.
-/// Static solid nodes and blocks divided along z stay with the host fluid.
+/// Static solid nodes stay with the host fluid.
 template <class Real>
 class DeviceFluid {
  public:
   /// Takes over the parameters and the state of \p host. \p planes: the sweep over the lattice is cut into
   /// slabs of so many planes, and a slab's moments follow its collision while its populations are still in
-  /// the cache (0: chosen from the size of the block, for 32 MB). \throws InputError for a divided fluid or
-  /// one with solid nodes.
+  /// the cache (0: chosen from the size of the block, for 32 MB). \throws InputError for a fluid with solid
+  /// nodes.
   DeviceFluid(Queue& queue, const Fluid<Real>& host, int planes = 0);
+
+  // A block divided along z takes a step in three parts (Fluid's, fluid.hpp):
+  //     begin_advance(force, velocity, share); send_borders(message);
+  //     the neighbours exchange their messages
+  //     receive_borders(message); end_advance(force, velocity, share);
+  // The velocity's halo planes along z are left alone.
+  void begin_advance(const Node4<Real>* force, Node4<Real>* velocity, Real share);
+  void end_advance(const Node4<Real>* force, Node4<Real>* velocity, Real share);
+  /// Messages lie on the host, [side: low, high][border_size()].
+  std::size_t border_size() const { return border_.size() / 2; }
+  void send_borders(Real* message);
+  void receive_borders(const Real* message);
 
   /// Enqueues one step: collision with \p force (with halo; null: body force only), streaming, and velocity =
   /// u* + \p share F of the new state, with the periodic halo. Place of both fields: the queue's.
@@ -40,7 +52,7 @@ class DeviceFluid {
 
  private:
   template <bool odd>
-  void sweep(const Node4<Real>* force, Node4<Real>* velocity, Real share);
+  void collide(const Node4<Real>* force, Node4<Real>* velocity, Real share);
   template <bool odd>
   void take_moments(int first_plane, int planes, const Node4<Real>* force, Node4<Real>* velocity, Real share);
 
@@ -50,7 +62,7 @@ class DeviceFluid {
   int planes_;
   bool swapped_ = false;
   std::int64_t steps_ = 0;
-  Array<Real> f_;
+  Array<Real> f_, border_;
   Array<Node4<Real>> outgoing_;
   Array<double> wall_total_;
   Lattice<Real> lattice_;

@@ -13,19 +13,22 @@
 
 namespace hemowalk::lbm {
 
-/// What the kernels know of a fluid. Populations are [direction][k][j][i], deviations f_i - w_i.
+/// What the kernels know of a fluid. Populations are [direction][k][j][i], deviations f_i - w_i. A block
+/// divided along z has the planes k = -1 and nz of its neighbours, in which only what crosses a border is
+/// kept.
 template <class Real>
 struct Lattice {
   Block block;
   bool walls_y;
+  int beyond;  ///< planes of other blocks on either side: 1, or 0 (periodic along z)
   Real* f;
-  std::uint32_t stride;  ///< nodes
+  std::uint32_t stride;  ///< nodes, those of other blocks included
   Real body[3];
   Relaxation<Real> rate;
   Real wall_term[2][directions];  ///< 6 w_i c_i . u_wall where i leaves the lower, upper wall
 
   HEMO_HD std::uint32_t at(int i, int j, int k) const {
-    return (static_cast<std::uint32_t>(k) * static_cast<std::uint32_t>(block.ny) +
+    return (static_cast<std::uint32_t>(k + beyond) * static_cast<std::uint32_t>(block.ny) +
             static_cast<std::uint32_t>(j)) *
                static_cast<std::uint32_t>(block.nx) +
            static_cast<std::uint32_t>(i);
@@ -41,7 +44,7 @@ HEMO_HD inline NodeIndex node_of(const Lattice<Real>& l, std::uint32_t n) {
   const std::uint32_t row = n / static_cast<std::uint32_t>(l.block.nx),
                       k = row / static_cast<std::uint32_t>(l.block.ny);
   return {static_cast<int>(n - row * static_cast<std::uint32_t>(l.block.nx)),
-          static_cast<int>(row - k * static_cast<std::uint32_t>(l.block.ny)), static_cast<int>(k)};
+          static_cast<int>(row - k * static_cast<std::uint32_t>(l.block.ny)), static_cast<int>(k) - l.beyond};
 }
 
 /// Where population I of a node is stored before a step (and, as I's opposite, after it).
@@ -59,7 +62,7 @@ HEMO_HD HEMO_INLINE SlotOf<Real> slot_of(const Lattice<Real>& l, const NodeIndex
     return {l.f + static_cast<std::size_t>(I) * l.stride + n, l.wall_term[j < 0 ? 0 : 1][I]};
   const std::uint32_t from = l.at(cx == 0 ? x.i : Lattice<Real>::wrap(x.i - cx, l.block.nx),
                                   cy == 0 ? x.j : Lattice<Real>::wrap(j, l.block.ny),
-                                  cz == 0 ? x.k : Lattice<Real>::wrap(x.k - cz, l.block.nz));
+                                  cz == 0 || l.beyond ? x.k - cz : Lattice<Real>::wrap(x.k - cz, l.block.nz));
   return {l.f + static_cast<std::size_t>(opposite(I)) * l.stride + from, Real(0)};
 }
 
@@ -145,8 +148,9 @@ struct TakeMoments {
   HEMO_HD void put(const Node4<Real>& u, const NodeIndex& x) const {
     velocity[l.block.at(x.i, x.j, x.k)] = u;
     const bool y = !l.walls_y && near_face(x.j, l.block.ny);
-    if (!near_face(x.i, l.block.nx) && !y && !near_face(x.k, l.block.nz)) return;
-    for (int c = -1; c <= 1; ++c)
+    const bool z = !l.beyond && near_face(x.k, l.block.nz);
+    if (!near_face(x.i, l.block.nx) && !y && !z) return;
+    for (int c = z ? -1 : 0; c <= (z ? 1 : 0); ++c)
       for (int b = y ? -1 : 0; b <= (y ? 1 : 0); ++b)
         for (int a = -1; a <= 1; ++a) {
           const int i = x.i + a * l.block.nx, j = x.j + b * l.block.ny, k = x.k + c * l.block.nz;
@@ -155,6 +159,45 @@ struct TakeMoments {
         }
   }
   HEMO_HD static bool inside(int i, int n) { return i >= -Block::halo && i < n + Block::halo; }
+};
+
+/// The populations that cross a border, to or from messages [side][5][ny][nx]: one thread per column of the
+/// message, sides one after the other. After an even step the border planes go out to where the neighbour
+/// will collide them; after an odd one the neighbour's planes, collided here, go back.
+template <class Real, bool out>
+struct CrossBorder {
+  Lattice<Real> l;
+  bool odd;  ///< the coming step is an odd one
+  Real* message;
+
+  HEMO_HD static std::size_t count(const Block& b) {
+    return 2 * static_cast<std::size_t>(b.ny) * static_cast<std::size_t>(b.nx);
+  }
+  HEMO_HD void operator()(std::size_t n) const {
+    const std::size_t plane = count(l.block) / 2;
+    const bool high = n >= plane;
+    const std::size_t node = high ? n - plane : n;
+    const int i = static_cast<int>(node % static_cast<std::size_t>(l.block.nx)),
+              j = static_cast<int>(node / static_cast<std::size_t>(l.block.nx));
+    const int inner = high ? l.block.nz - 1 : 0, outer = high ? l.block.nz : -1;
+    const std::uint32_t at = l.at(i, j, odd == out ? inner : outer);
+    // Out of the low side go upward slots before an odd step, downward ones after it; in come the others.
+    const bool upward = (high != odd) == out;
+    Real* slot = message + (high ? 5 * plane : 0) + node;
+    unroll<directions>([&](auto direction) HEMO_INLINE_LAMBDA {
+      constexpr int d = decltype(direction)::value, cy = c[d][1], cz = c[d][2];
+      if constexpr (cz != 0) {
+        if ((cz > 0) != upward) return;
+        Real& mine = l.f[static_cast<std::size_t>(d) * l.stride + at];
+        [[maybe_unused]] const int from = j - cy;
+        if constexpr (out)
+          *slot = mine;
+        else if (odd || !l.walls_y || (from >= 0 && from < l.block.ny))  // else it bounced off: nothing came
+          mine = *slot;
+        slot += plane;
+      }
+    });
+  }
 };
 
 /// Writes the walls' velocities into the halo beyond them; once is enough. One thread per halo node of both

@@ -18,7 +18,7 @@ find core resolved calibration coarse workflow -type f \( -name '*.hpp' -o -name
   }
   function is_solver(name) { return name ~ /^resolved\/(lbm|npfem|rigid|ibm|contact|mesh)$/ }
   # What a bare GPU machine has: a compiler and Eigen. These headers of core/ need nothing else.
-  function is_bare(path) { return path ~ /^core\/(portability|check|view|array|parallel|simd|block|device)\.hpp$/ }
+  function is_bare(path) { return path ~ /^core\/(portability|check|view|array|parallel|simd|block|device|device_choice)\.hpp$/ }
   function needs_library(path) {
     return path ~ /^(hdf5|mpi|yaml-cpp|gsl|fmt|spdlog|nlohmann|CLI|udunits2|zstd|Random123|sqlite3|openssl)/
   }

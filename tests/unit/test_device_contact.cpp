@@ -78,7 +78,7 @@ struct OnQueue {
     markers.locate(origin.data(), local.data());
     const auto& b = markers.bins();
     contact.compute(origin.data(), local.data(),
-                    {block, true, ibm::bin_edge, b.x, b.y, b.z, markers.begin(), markers.listed(), 1e-3});
+                    {block, true, 0, ibm::bin_edge, b.x, b.y, b.z, markers.begin(), markers.listed(), 1e-3});
     std::vector<std::int64_t> grains(3 * crowd.local.size());
     queue.copy(grains.data(), contact.forces(), grains.size());
     queue.wait();
@@ -170,7 +170,7 @@ TEST_P(DeviceContactTest, ListsThatAreTooShortAreAnError) {
   const auto& b = device.markers.bins();
   tight.compute(
       origin.data(), local.data(),
-      {block, true, ibm::bin_edge, b.x, b.y, b.z, device.markers.begin(), device.markers.listed(), 1e-3});
+      {block, true, 0, ibm::bin_edge, b.x, b.y, b.z, device.markers.begin(), device.markers.listed(), 1e-3});
   EXPECT_THROW((void)tight.summary(), PhysicsError);
 }
 

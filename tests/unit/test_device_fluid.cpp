@@ -177,6 +177,79 @@ TEST_P(DeviceFluidTest, ShareOfTheForceIsAddedToTheVelocity) {
   });
 }
 
+// A domain divided along z, as many blocks in one process, against the undivided device fluid: the same
+// numbers meet in the same order.
+template <class Real>
+void divided_like_whole(Place place, const std::vector<int>& planes, bool walls) {
+  const Block whole{9, 5, 11};
+  Parameters p = moving_walls(walls);
+  Pair<Real> one(place, whole, p, 3);
+  p.divided_z = true;
+  struct Part {
+    Block block;
+    int first;
+    DeviceFluid<Real> fluid;
+    Field<Real> force, velocity;
+    std::vector<Real> out, in;
+  };
+  std::vector<Part> parts;
+  int first = 0;
+  for (const int nz : planes) {
+    const Block b{whole.nx, whole.ny, nz};
+    Fluid<Real> host(b, p);
+    const auto state = one.host.save();
+    const auto cut = cut_state({state.data(), state.size()}, first, nz);
+    host.load({cut.data(), cut.size()});
+    const std::size_t n = 2 * host.border_size();
+    parts.push_back({b, first, DeviceFluid<Real>(one.queue, host, 2), Field<Real>(b.size(), place),
+                     Field<Real>(b.size(), place), std::vector<Real>(n), std::vector<Real>(n)});
+    first += nz;
+  }
+  for (int step = 0; step < 5; ++step) {
+    one.step();
+    for (Part& part : parts) {
+      Field<Real> force(part.block.size());
+      for_nodes(part.block, [&](int i, int j, int k) {
+        force[part.block.at(i, j, k)] = one.force.field[whole.at(i, j, part.first + k)];
+      });
+      one.queue.copy(part.force.data(), force.data(), force.size());
+      part.fluid.begin_advance(part.force.data(), part.velocity.data(), Real(0));
+      part.fluid.send_borders(part.out.data());
+      one.queue.wait();
+    }
+    for (std::size_t r = 0; r < parts.size(); ++r) {
+      const std::size_t n = parts[r].fluid.border_size();
+      const auto &below = parts[(r + parts.size() - 1) % parts.size()],
+                 &above = parts[(r + 1) % parts.size()];
+      std::copy_n(below.out.begin() + static_cast<std::ptrdiff_t>(n), n, parts[r].in.begin());
+      std::copy_n(above.out.begin(), n, parts[r].in.begin() + static_cast<std::ptrdiff_t>(n));
+      parts[r].fluid.receive_borders(parts[r].in.data());
+      parts[r].fluid.end_advance(parts[r].force.data(), parts[r].velocity.data(), Real(0));
+      one.queue.wait();
+    }
+    for (const Part& part : parts) {
+      const auto u = place_copy(Place::host, part.velocity);
+      for_nodes(part.block, [&](int i, int j, int k) {
+        const auto mine = u[part.block.at(i, j, k)],
+                   same = one.device_velocity[whole.at(i, j, part.first + k)];
+        ASSERT_EQ(mine.x, same.x) << step << ": " << i << ' ' << j << ' ' << part.first + k;
+        ASSERT_EQ(mine.y, same.y);
+        ASSERT_EQ(mine.z, same.z);
+        ASSERT_EQ(mine.w, same.w);
+      });
+      EXPECT_EQ(u[part.block.at(0, 0, -1)].z, 0) << "the halo along z belongs to the neighbours";
+    }
+  }
+}
+
+TEST_P(DeviceFluidTest, DividedGivesTheWholeBitForBit) {
+  for (const bool walls : {true, false})
+    for (const std::vector<int>& planes : {std::vector<int>{11}, {5, 6}, {1, 3, 7}, {4, 1, 1, 5}}) {
+      divided_like_whole<float>(GetParam(), planes, walls);
+      divided_like_whole<double>(GetParam(), planes, walls);
+    }
+}
+
 TEST(DeviceFluid, RefusesSolidNodes) {
   Fluid<float> host({8, 8, 8}, Parameters{});
   host.set_solid([](int i, int j, int k) { return i + j + k == 3; });

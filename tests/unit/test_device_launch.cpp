@@ -18,6 +18,13 @@ TEST(Devices, RanksOfAMachineTakeTurns) {
     EXPECT_EQ(device_of_process(4), std::stoi(value) % 4);
     EXPECT_EQ(device_of_process(1), 0);
   }
+  // From the first device of their run on.
+  setenv("HEMOWALK_DEVICE", "6", 1);
+  EXPECT_EQ(device_of_process(16), 11);
+  EXPECT_EQ(device_of_process(4), 3);
+  setenv("HEMOWALK_DEVICE", "-1", 1);
+  EXPECT_EQ(device_of_process(16), 5);
+  unsetenv("HEMOWALK_DEVICE");
   for (const auto& [name, value] : launchers) unsetenv(name);
 }
 
@@ -133,6 +140,19 @@ TEST(Launch, IntegerAtomics) {
   EXPECT_EQ(least, 4);
   atomic_min(&least, -2);
   EXPECT_EQ(least, -2);
+}
+
+TEST(Launch, ArraysGrowAndKeepWhatTheyHold) {
+  Queue queue(Place::host);
+  Array<int> array;
+  queue.fit(array, 3);
+  EXPECT_EQ(array.size(), 3u);
+  queue.upload(array, {7, 8, 9});
+  queue.fit(array, 2);
+  EXPECT_EQ(array.size(), 3u);
+  queue.fit(array, 8);
+  EXPECT_EQ(array.size(), 10u) << "room for a quarter more";
+  EXPECT_EQ(array[2], 9);
 }
 
 TEST(Launch, AskingForAMissingDeviceIsAnInputError) {

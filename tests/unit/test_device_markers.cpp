@@ -139,6 +139,62 @@ TEST_P(DeviceMarkersTest, SmallestBlocks) {
   expect_as_on_host<double>(GetParam(), {9, 4, 5}, false, Kernel::phi4);
 }
 
+// Blocks divided along z, each with the planes of the field that are its own and all markers, in the image
+// nearest to it: every node counts once, so readings and impulses on walls add up, and each block has its
+// part of the force. A marker far beyond any block must reach none.
+TEST_P(DeviceMarkersTest, DividedBlocksAddUpToTheWhole) {
+  const Block whole{9, 13, 26};
+  const Faces faces{true, false, true, {0.1, 0, -0.2}, {0.3, 0, 0.4}};
+  Faces divided = faces;
+  divided.periodic_z = false;
+  Cloud<double> cloud(whole, true, 1500, 5);
+  fill_velocity_halo(whole, faces, cloud.field.view());
+  const auto one = on_queue(GetParam(), whole, faces, Kernel::phi4, cloud);
+  Array<Node4<double>> read(cloud.local.size());
+  std::array<std::array<double, 3>, 2> wall{};
+  int first = 0;
+  for (const int planes : {7, 19}) {
+    const Block b{whole.nx, whole.ny, planes};
+    const std::size_t count = cloud.local.size();
+    Cloud<double> part(b, true, static_cast<int>(count) + 1, 5);  // a body per marker, and one far away
+    part.origin = Array<Origin>(count + 1);
+    for (auto& node : part.field) node = {0, 0, 0, 0};
+    for (int k = 0; k < planes; ++k)
+      std::copy_n(&cloud.field[whole.at(-3, -3, first + k)], b.plane(), &part.field[b.at(-3, -3, k)]);
+    const double lowest = (planes - whole.nz) / 2;
+    for (std::size_t m = 0; m <= count; ++m) part.body[m] = static_cast<std::int32_t>(m);
+    for (std::size_t m = 0; m < count; ++m) {
+      part.origin[m] = cloud.origin[cloud.body[m]];
+      part.local[m] = cloud.local[m], part.value[m] = cloud.value[m];
+      const double z = part.origin[m][2] + part.local[m].z - first;
+      part.origin[m][2] -= first + static_cast<int>(std::floor((z - lowest) / whole.nz)) * whole.nz;
+    }
+    part.origin[count] = {1, 1, 200000}, part.local[count] = {0.5, 0.5, 0.5, 0};
+    const auto found = on_queue(GetParam(), b, divided, Kernel::phi4, part);
+    EXPECT_EQ(found.read[count].x, 0);
+    for (std::size_t m = 0; m < read.size(); ++m)
+      read[m].x += found.read[m].x, read[m].y += found.read[m].y, read[m].z += found.read[m].z;
+    for (int w = 0; w < 2; ++w)
+      for (int d = 0; d < 3; ++d) wall[w][d] += found.wall[w][d];
+    const double most = 500 * std::numeric_limits<double>::epsilon() * 5;
+    for (int k = 0; k < planes; ++k)
+      for (int j = 0; j < b.ny; ++j)
+        for (int i = 0; i < b.nx; ++i) {
+          const auto mine = found.force[b.at(i, j, k)], same = one.force[whole.at(i, j, first + k)];
+          ASSERT_NEAR(mine.x, same.x, most) << i << ' ' << j << ' ' << first + k;
+          ASSERT_NEAR(mine.z, same.z, most) << i << ' ' << j << ' ' << first + k;
+        }
+    first += planes;
+  }
+  for (std::size_t m = 0; m < read.size(); ++m) {
+    const double most = 64 * std::numeric_limits<double>::epsilon() * 5;
+    ASSERT_NEAR(read[m].x, one.read[m].x, most) << m;
+    ASSERT_NEAR(read[m].z, one.read[m].z, most) << m;
+  }
+  for (int w = 0; w < 2; ++w)
+    for (int d = 0; d < 3; ++d) EXPECT_NEAR(wall[w][d], one.wall[w][d], 1e-11);
+}
+
 TEST_P(DeviceMarkersTest, OrderOfThreadsChangesNoBit) {
   const Block b{18, 13, 22};
   const Cloud<float> cloud(b, true, 1500, 3);
