@@ -173,26 +173,30 @@ TEST(PairCollision, UnderTheThreeCouplings) {
   const auto show = [](const char* name, double kappa, bool platelet, double s, const auto& change) {
     std::vector<data::Kind> kinds{test::red_cell_kind(kappa)};
     if (platelet) kinds.push_back(test::platelet_kind());
+    std::printf("%s %s %.1f %.0f | ", name, platelet ? "platelet" : "red cell", kappa, s);
     test::Collision c;
     try {
       c = test::collide(kinds, s, 2.5, 11, change);
+      std::isnan(c.net) ? std::printf("have not passed at a strain of 40\n")
+                        : std::printf("%.4f %.4f\n", c.net, c.peak);
     } catch (const PhysicsError& error) {
-      c = {std::nan(""), std::nan("")};
+      std::printf("%s\n", error.what());
     }
-    std::printf("%s %s %.1f %.0f | %.4f %.4f\n", name, platelet ? "platelet" : "red cell", kappa, s, c.net,
-                c.peak);
     std::fflush(stdout);
     return c;
   };
+  const char* partner = std::getenv("HEMOWALK_PARTNER");  // red_cell, platelet: only this one
   const auto as_it_is = [](data::Scene&) {};
   const auto peskin = [](data::Scene& scene) {
     scene.coupling.scheme = data::Coupling::Scheme::peskin, scene.coupling.retraction = 0;
   };
   for (const bool platelet : {false, true}) {
+    if (partner && platelet != (std::string(partner) == "platelet")) continue;
     const auto ours = show("conservative", 0.5, platelet, 50, as_it_is);
     EXPECT_GT(ours.net, 0.05);
     show("paper", 0.5, platelet, 50, test::use_paper_coupling);
   }
+  if (partner) return;
   show("conservative", 0, false, 16, as_it_is);
   show("peskin", 0, false, 16, peskin);
 }
