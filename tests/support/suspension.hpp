@@ -29,7 +29,6 @@ struct SuspensionCase {
   data::Coupling coupling;
   double dx = 0.5;      ///< um
   int subdivision = 0;  ///< of the membranes; 0: follows dx
-  double C = 0;         ///< the paper's area modulus, N/m; 0: its own
 };
 
 struct SuspensionResult {
@@ -49,7 +48,6 @@ inline data::Scene suspension_scene(const SuspensionCase& c, std::uint64_t seed)
   scene.cells.kinds.resize(1);
   scene.cells.kinds[0].kappa_damping = c.kappa;
   scene.cells.kinds[0].subdivision = c.subdivision ? c.subdivision : static_cast<int>(std::lround(4 / c.dx));
-  if (c.C > 0) scene.cells.kinds[0].C = c.C;
   scene.flow.walls = data::Flow::Walls::both;
   scene.flow.shear_rate = c.shear_rate;
   scene.acceleration = c.inertia / c.shear_rate;

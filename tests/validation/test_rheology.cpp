@@ -140,26 +140,6 @@ TEST(Rheology, ViscosityAndPowerOverLatticeSpacing) {
   EXPECT_GT(runs[0].viscosity - runs[4].viscosity, 0.3 * (runs[0].viscosity - runs[2].viscosity));
 }
 
-// Why a coarse mesh makes blood thicker: a membrane of large triangles that hardly change their area cannot
-// bend both ways. With a tenth of the area modulus the mesh should matter less.
-TEST(Rheology, ViscosityOverTheMeshAndTheAreaModulus) {
-  SuspensionCase c;
-  c.box = {12, 12, 12}, c.strain = 8;
-  const auto coarse = test::suspension_scene(c, 1);
-  const auto cells = pack(coarse);
-  std::printf("| C, N/m | subdivision |%s\n", columns);
-  for (const double C : {5e-4, 5e-3})
-    for (const int subdivision : {8, 12}) {
-      c.C = C, c.subdivision = subdivision;
-      const auto scene = test::suspension_scene(c, 1);
-      const auto r = test::shear_suspension(c, test::refine(cells, coarse, scene), scene);
-      std::printf("| %g | %d |", C, subdivision);
-      print_row({r});
-      r.power.print("shares");
-      expect_sound({r});
-    }
-}
-
 // Walls 15 um apart, periodic box twice and four times as wide: one packing each of what holds more cells.
 TEST(Rheology, ViscosityOverBox) {
   std::printf("| box, µm |%s\n", columns);

@@ -85,8 +85,8 @@ void use_springs(Sim& sim, double stiffness) {
                  {}});
 }
 
-// With the lattice's plasma: momentum closes to round-off, and softer springs give way more. Above the middle,
-// where the membrane has a momentum to lose.
+// With the lattice's plasma: momentum closes to round-off, and softer springs give way more. Above the
+// middle, where the membrane has a momentum to lose.
 TEST(Replaceable, AMembraneOfSpringsInTheFluid) {
   double deformation[2];
   for (const int stiff : {0, 1}) {
