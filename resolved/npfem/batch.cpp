@@ -256,17 +256,20 @@ template <class Real>
 }
 
 template <class Real>
+auto BatchKernel<Real>::aim(const BatchFields<Real>& b, const Frame& frame, bool damping, int k) const
+    -> Aim {
+  const V free = load3(b.predicted, k);
+  if (!damping) return {free, t_.mass_rate[k] * (1 - t_.kappa[k])};
+  return {free + t_.kappa[k] * (frame.at(load3(b.offset, k)) - free), t_.mass_rate[k]};
+}
+
+template <class Real>
 [[gnu::flatten]] auto BatchKernel<Real>::unbalance(const BatchFields<Real>& b, const Frame& frame,
                                                    bool damping) -> P {
   const P p = membrane_forces(b.offset);
   P square(0);
   for (int k = 0; k < t_.vertices; ++k) {
-    V wanted = load3(b.predicted, k);
-    Real rate = t_.mass_rate[k];
-    if (damping)
-      wanted = wanted + t_.kappa[k] * (frame.at(load3(b.offset, k)) - wanted);
-    else
-      rate *= 1 - t_.kappa[k];
+    const auto [wanted, rate] = aim(b, frame, damping, k);
     const V inertia = rate * (t_.h * wanted - load3(s_.increment.data(), k));
     square += dot(inertia, inertia);
     add3(inertia - p * load3(s_.gradient.data(), k), s_.force.data(), k);
@@ -300,12 +303,7 @@ void BatchKernel<Real>::runge_kutta(const BatchFields<Real>& b, const Frame& fra
   for (int stage = 0; stage < 4; ++stage) {
     const P p = membrane_forces(b.offset);
     for (int k = 0; k < t_.vertices; ++k) {
-      V wanted = load3(b.predicted, k);
-      Real rate = t_.mass_rate[k];
-      if (damping)
-        wanted = wanted + t_.kappa[k] * (frame.at(load3(b.offset, k)) - wanted);
-      else
-        rate *= 1 - t_.kappa[k];
+      const auto [wanted, rate] = aim(b, frame, damping, k);
       const V force = load3(s_.force.data(), k) - p * load3(s_.gradient.data(), k);
       const V d = t_.h * wanted + (1 / rate) * force;
       store3(load3(sum, k) + weight[stage] * d, sum, k);

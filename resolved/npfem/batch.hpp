@@ -92,6 +92,12 @@ class BatchKernel {
     V at(const V& r) const { return motion.velocity + cross(motion.spin, r - body.centre()); }
   };
   Frame find_frame(const BatchFields<Real>& b);
+  /// What the velocity of a vertex tends to without forces, v', and how stiffly, m/(h^2 (1 - kappa)).
+  struct Aim {
+    V velocity;
+    Real rate;
+  };
+  Aim aim(const BatchFields<Real>& b, const Frame& frame, bool damping, int k) const;
   /// F_int - m/(h^2 (1 - kappa)) (d - h v') into scratch.force, v' = v_pred damped towards the rigid motion.
   /// \returns sum of squares of the inertial part, for scale.
   P unbalance(const BatchFields<Real>& b, const Frame& frame, bool damping);

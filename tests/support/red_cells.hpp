@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <vector>
 
 #include "resolved/build.hpp"
@@ -26,6 +27,15 @@ inline data::Kind platelet_kind() {
   k.name = "platelet", k.shape.type = data::Shape::Type::platelet, k.subdivision = 4;
   k.law = data::Kind::Law::rigid;
   return k;
+}
+
+/// The published coupling and its contact as a scene file sets them by `scheme: paper`, `model:
+/// particle_in_kernel`.
+inline void use_paper_coupling(data::Scene& scene) {
+  data::Coupling& c = scene.coupling;
+  c.scheme = data::Coupling::Scheme::paper, c.retraction = 0, c.solid_every = 2, c.iterations = 4;
+  c.velocity_cap = 0.03, c.median_filter = true;
+  scene.contact.model = data::Contact::Model::particle_in_kernel, scene.contact.range = 1e-6;
 }
 
 /// Couette flow at 100 1/s between walls that move at +-U/2; box in um (x, y, z).
@@ -136,12 +146,14 @@ struct Collision {
 
 /// Two bodies of \p kinds (the first and the last) that pass each other. They start \p apart um from each
 /// other along the flow and \p offset um across it, and the run ends when they are as far apart on the other
-/// side.
-inline Collision collide(std::vector<data::Kind> kinds, double acceleration, double offset,
-                         double apart = 11) {
+/// side. \p change: what else is different in the scene.
+inline Collision collide(
+    std::vector<data::Kind> kinds, double acceleration, double offset, double apart = 11,
+    const std::function<void(data::Scene&)>& change = [](data::Scene&) {}) {
   const data::Vec3 box{14, 18, 36};  // images along the flow stay farther away than the partner
   const int last = static_cast<int>(kinds.size()) - 1;
-  const auto scene = shear_scene(box, acceleration, std::move(kinds));
+  auto scene = shear_scene(box, acceleration, std::move(kinds));
+  change(scene);
   const double half = offset / 2 / 0.5, away = apart / 2 / 0.5;  // dx
   resolved::Simulation<float> sim(scene, {{0, {14, 18 + half, 36 - away}, mesh::identity_rotation, {}},
                                           {last, {14, 18 - half, 36 + away}, mesh::identity_rotation, {}}});

@@ -15,6 +15,7 @@
 #include "resolved/packing.hpp"
 #include "resolved/recorder.hpp"
 #include "support/blood_scene.hpp"
+#include "support/power_shares.hpp"
 
 namespace hemowalk::test {
 
@@ -26,7 +27,8 @@ struct SuspensionCase {
   double inertia = 5000;  ///< shear rate times acceleration, 1/s: equal for all shear rates
   double lag = 2;         ///< strain over which displacements are taken
   data::Coupling coupling;
-  double dx = 0.5;  ///< um; the membranes' subdivision follows
+  double dx = 0.5;      ///< um
+  int subdivision = 0;  ///< of the membranes; 0: follows dx
 };
 
 struct SuspensionResult {
@@ -37,6 +39,7 @@ struct SuspensionResult {
   double plasma_layer = 0;     ///< um, mean over both walls: hematocrit below half the core's
   double stray = 0;            ///< um2, mean square displacement across the flow of red cells over the lag
   double volume = 1;           ///< the cell's that lost or gained most, at the end over the start
+  Shares power;                ///< of the second half
 };
 
 inline data::Scene suspension_scene(const SuspensionCase& c, std::uint64_t seed) {
@@ -44,7 +47,7 @@ inline data::Scene suspension_scene(const SuspensionCase& c, std::uint64_t seed)
   scene.cells.platelets_per_rbc = 0;
   scene.cells.kinds.resize(1);
   scene.cells.kinds[0].kappa_damping = c.kappa;
-  scene.cells.kinds[0].subdivision = static_cast<int>(std::lround(4 / c.dx));
+  scene.cells.kinds[0].subdivision = c.subdivision ? c.subdivision : static_cast<int>(std::lround(4 / c.dx));
   scene.flow.walls = data::Flow::Walls::both;
   scene.flow.shear_rate = c.shear_rate;
   scene.acceleration = c.inertia / c.shear_rate;
@@ -129,8 +132,12 @@ inline SuspensionResult shear_suspension(const SuspensionCase& c,
              every = std::max<std::int64_t>(1, steps / looks);
   const int lag = static_cast<int>(std::lround(c.lag / rate / static_cast<double>(every)));
   std::vector<std::vector<double>> height;
+  SuspensionResult out;
   for (std::int64_t i = 1; i <= steps; ++i) {
-    sim.step();
+    if (i % every == 0 && 2 * i > steps)
+      out.power.sample(sim);
+    else
+      sim.step();
     if (i % every) continue;
     height.emplace_back();
     for (int k = 0; k < group.count(); ++k) height.back().push_back(group.observe(k).centre[1]);
@@ -140,7 +147,6 @@ inline SuspensionResult shear_suspension(const SuspensionCase& c,
   const data::Profiles& profile = recorder.trajectories().profile;
   const int n = static_cast<int>(profile.y.size()), low = n * 3 / 10, high = n - low;
   const double plasma = scene.fluid.density * scene.fluid.kinematic_viscosity * c.shear_rate;
-  SuspensionResult out;
   for (int j = 0; j < n; ++j) out.viscosity += profile.shear_stress[j] / plasma / n;
   std::vector<double> y, u;
   for (int j = low; j < high; ++j) {

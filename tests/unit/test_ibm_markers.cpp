@@ -125,6 +125,46 @@ TEST(Markers, TorqueIsConservedAwayFromTheFaces) {
   EXPECT_NEAR(got, want, 1e-10);
 }
 
+// Kernels keep the first moment, so torque is kept where all of a kernel is counted: what lies beyond a wall
+// at the nodes there. What is booked to the wall is a force without a place: taken at the wall's plane, where
+// the wall is, it lacks the lever from there to the nodes beyond. A force F along a wall at the distance d
+// then turns the fluid as if it acted at d + sum of phi(d - y_j) |y_j| over nodes y_j < 0.
+TEST(Markers, TorqueAtAWallLacksTheLeverOfTheNodesBeyondIt) {
+  struct Distance {
+    double d, beyond, lever;  // dx; share of phi4 beyond the wall; missing lever, dx
+  };
+  const double half = (2 + std::sqrt(2)) / 8, far = (2 - std::sqrt(2)) / 8;  // phi4 at 1/2 and 3/2
+  for (const auto& [d, beyond, lever] : {Distance{0, 0.5, half * 0.5 + far * 1.5}, Distance{0.5, 0.25, 0.125},
+                                         Distance{1, far, far * 0.5}, Distance{1.5, 0, 0}})
+    for (const bool upper : {false, true}) {
+      Cloud cloud(1);
+      const double wall = upper ? block.ny : 0;
+      cloud.local[0] = {9.3, upper ? wall - d : d, 11.1, 0};
+      Markers<double> markers(block, Faces{}, Kernel::phi4, cloud.body);
+      markers.locate(cloud.origin.view(), cloud.local.view());
+      Array<Node4<double>> value(1), force(block.size());
+      value[0] = {0.3, -0.2, 1, 0};
+      markers.spread(value.view(), force.view());
+      const auto torque = [&](int from, int to) {  // about the x axis through the wall
+        double sum = 0;
+        for (int k = -3; k < block.nz + 3; ++k)
+          for (int j = from; j < to; ++j)
+            for (int i = -3; i < block.nx + 3; ++i) {
+              const auto f = force[block.at(i, j, k)];
+              sum += (j + .5 - wall) * f.z - (k + .5) * f.y;
+            }
+        return sum;
+      };
+      const double given = (cloud.local[0].y - wall) * value[0].z - cloud.local[0].z * value[0].y;
+      EXPECT_NEAR(torque(-3, block.ny + 3), given, 1e-13) << "of the whole kernel, at " << d;
+      const double fluid = torque(0, block.ny);
+      const auto impulse = fold_force_halo(block, Faces{}, force.view());
+      EXPECT_NEAR(impulse[upper][2], beyond * value[0].z, 1e-13) << d;
+      const double at_wall = -cloud.local[0].z * impulse[upper][1];
+      EXPECT_NEAR(fluid + at_wall - given, (upper ? -1 : 1) * lever * value[0].z, 1e-13) << d;
+    }
+}
+
 TEST(Markers, SameSumsForAnyNumberOfThreads) {
   Cloud cloud(20000);
   const auto local = convert<float>(cloud.local);

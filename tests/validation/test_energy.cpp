@@ -7,36 +7,14 @@
 
 #include "resolved/packing.hpp"
 #include "support/blood_scene.hpp"
+#include "support/power_shares.hpp"
 #include "support/red_cells.hpp"
 #include "support/single_body.hpp"
 
 namespace hemowalk::resolved {
 namespace {
 
-struct Shares {
-  EnergyBudget sum;  ///< over the sampled steps
-  int steps = 0;
-
-  template <class Real>
-  void sample(Simulation<Real>& sim) {
-    EnergyBudget b;
-    sim.step(&b);
-    auto* to = &sum.walls;
-    const auto* from = &b.walls;
-    for (std::size_t i = 0; i < sizeof b / sizeof(double); ++i) to[i] += from[i];
-    ++steps;
-  }
-  double numerical() const { return (sum.slip + sum.stressless) / sum.fed(); }
-  void print(const char* what) const {
-    const double p = sum.fed() / 100;
-    std::printf(
-        "%s: plasma %.2f, kappa %.3f, slip %.3f, lattice %.3f, membranes %.3f, contact %.3f, inertia %.3f, "
-        "residual %.4f %%\n",
-        what, sum.viscous / p, sum.damping / p, sum.slip / p, sum.stressless / p, sum.membranes / p,
-        sum.contact / p, sum.inertia / p, 100 * sum.residual());
-    std::fflush(stdout);
-  }
-};
+using test::Shares;
 
 /// Neo-Hookean capsule, Ca 0.1, radius 2.5 um = \p nodes dx, box of 6 radii, steady from a strain of 4 on.
 Shares capsule(double nodes, double acceleration) {
