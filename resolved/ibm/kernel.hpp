@@ -33,21 +33,16 @@ HEMO_HD inline Weights<T> phi2(const T& f) {
   return {T(0) * f, T(1) - f, f, T(0) * f};
 }
 
-/// Three-point function: phi(r) = (1 + sqrt(1 - 3 r^2))/3 for |r| <= 1/2,
-/// (5 - 3|r| - sqrt(1 - 3 (1 - |r|)^2))/6 for 1/2 <= |r| <= 3/2.
-template <class T>
-HEMO_HD inline T phi3_near(const T& r) {
-  using std::sqrt;
-  return (T(1) + sqrt(T(1) - T(3) * r * r)) / T(3);
-}
+/// Three-point function: phi(r) = (1 + sqrt(1 - 3 r^2))/3 for |r| <= 1/2; the outer two weights follow from
+/// zeroth and first moment.
 template <class T>
 HEMO_HD inline Weights<T> phi3(const T& f) {
-  // Scalar only: the nearest node changes at f = 1/2. The outer weights follow from zeroth and first moment.
-  const bool left = f < T(0.5);
-  const T r = left ? f : f - T(1);  // marker relative to its nearest node
-  const T centre = phi3_near(r);
-  const T upper = (T(1) - centre + r) / T(2), lower = (T(1) - centre - r) / T(2);
-  return left ? Weights<T>{lower, centre, upper, T(0)} : Weights<T>{T(0), lower, centre, upper};
+  using std::floor, std::sqrt;
+  const T right = floor(f + T(0.5f)), left = T(1) - right;  // which node is nearest: one of them is 1
+  const T r = f - right;                                    // marker relative to it
+  const T centre = (T(1) + sqrt(T(1) - T(3) * r * r)) / T(3);
+  const T upper = (T(1) - centre + r) * T(0.5f), lower = (T(1) - centre - r) * T(0.5f);
+  return {left * lower, left * centre + right * lower, left * upper + right * centre, right * upper};
 }
 
 }  // namespace hemowalk::ibm

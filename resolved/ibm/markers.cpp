@@ -23,21 +23,14 @@ struct WeightBlock {
 };
 template <Kernel kernel, class Real>
 HEMO_INLINE void weigh(const Real* fraction, WeightBlock<Real>& out) {
-  if constexpr (kernel == Kernel::phi3) {
-    for (int l = 0; l < lanes; ++l) {
-      const auto w = phi3(fraction[l]);
-      out.w[0][l] = w.w0, out.w[1][l] = w.w1, out.w[2][l] = w.w2, out.w[3][l] = w.w3;
-    }
-  } else {
-    using P = Pack<Real, std::is_same_v<Real, float> ? 16 : 8>;
-    for (int l = 0; l < lanes; l += static_cast<int>(P::size())) {
-      const P f(fraction + l, stdx::element_aligned);
-      const auto w = kernel == Kernel::phi4 ? phi4(f) : phi2(f);
-      w.w0.copy_to(out.w[0] + l, stdx::element_aligned);
-      w.w1.copy_to(out.w[1] + l, stdx::element_aligned);
-      w.w2.copy_to(out.w[2] + l, stdx::element_aligned);
-      w.w3.copy_to(out.w[3] + l, stdx::element_aligned);
-    }
+  using P = Pack<Real, std::is_same_v<Real, float> ? 16 : 8>;
+  for (int l = 0; l < lanes; l += static_cast<int>(P::size())) {
+    const P f(fraction + l, stdx::element_aligned);
+    const auto w = kernel == Kernel::phi4 ? phi4(f) : kernel == Kernel::phi3 ? phi3(f) : phi2(f);
+    w.w0.copy_to(out.w[0] + l, stdx::element_aligned);
+    w.w1.copy_to(out.w[1] + l, stdx::element_aligned);
+    w.w2.copy_to(out.w[2] + l, stdx::element_aligned);
+    w.w3.copy_to(out.w[3] + l, stdx::element_aligned);
   }
 }
 

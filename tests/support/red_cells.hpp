@@ -95,12 +95,12 @@ constexpr double between_looks = 0.025;  ///< strain
 /// count from the strain \p from on.
 inline Shear red_cell_in_shear(double acceleration, double kappa, double strain, const mesh::Vec3& shift,
                                double angle = 0.5, double shear_rate = 100, double from = 0,
-                               double retraction = data::Coupling{}.retraction, double dx = 0.5) {
+                               const data::Coupling& coupling = {}, double dx = 0.5) {
   auto kind = red_cell_kind(kappa);
   kind.subdivision = static_cast<int>(std::lround(4 / dx));
   auto scene = shear_scene({14, 16, 14}, acceleration, {kind});
   scene.fluid.dx = 1e-6 * dx;
-  scene.flow.shear_rate = shear_rate, scene.coupling.retraction = retraction;
+  scene.flow.shear_rate = shear_rate, scene.coupling = coupling;
   resolved::Simulation<float> sim(
       scene,
       {{0, {7 / dx + shift[0], 8 / dx + shift[1], 7 / dx + shift[2]}, mesh::rotation({1, 0, 0}, angle), {}}});

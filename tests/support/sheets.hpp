@@ -14,6 +14,7 @@ namespace hemowalk::test_support {
 struct SheetCase {
   double gap = 1, retraction = 0.7, theta_n = 0.97, theta_t = 0.97, chi = 8.0 / 3, tau = 2, spacing = 1.43;
   double offset = 0;  // of the pair against the lattice, in dx
+  ibm::Kernel kernel = ibm::Kernel::phi4;
   int steps = 500;
 };
 
@@ -40,7 +41,7 @@ inline double relative_friction(const SheetCase& c) {
       for (int k = 0; k < m; ++k)
         site[(s * m + i) * m + k] = {(i + .25) * spacing, s ? y1 + c.retraction : y0 - c.retraction,
                                      (k + .25) * spacing, 0};
-  ibm::Markers<double> markers(block, faces, ibm::Kernel::phi4, std::vector<std::int32_t>(count, 0));
+  ibm::Markers<double> markers(block, faces, c.kernel, std::vector<std::int32_t>(count, 0));
   markers.locate(origin.view(), site.view());
   const resolved::SlipCorrection<double> correct{c.theta_n, c.theta_t};
   fluid.moments(velocity.view());

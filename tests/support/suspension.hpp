@@ -16,6 +16,7 @@
 #include "resolved/recorder.hpp"
 #include "support/blood_scene.hpp"
 #include "support/power_shares.hpp"
+#include "support/single_body.hpp"
 
 namespace hemowalk::test {
 

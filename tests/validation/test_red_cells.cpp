@@ -82,8 +82,10 @@ TEST(RedCell, RecoversAlikeInAnyOrientation) {
 std::pair<double, double> turning(double rate, double kappa, double angle = 0.5,
                                   double retraction = data::Coupling{}.retraction) {
   const double from = 5, strain = 25, turn = 2 * M_PI * (strain - from);
+  data::Coupling coupling;
+  coupling.retraction = retraction;
   const auto r =
-      test::red_cell_in_shear(std::min(100.0, 5000 / rate), kappa, strain, {}, angle, rate, from, retraction);
+      test::red_cell_in_shear(std::min(100.0, 5000 / rate), kappa, strain, {}, angle, rate, from, coupling);
   std::printf("%.0f, %.1f, %.1f, %.1f | %.3f %.1f %.4f %.4f\n", rate, kappa, angle, retraction, r.deformation,
               r.inclination * 180 / M_PI, r.marker_turn / turn, r.shape_turn / turn);
   std::fflush(stdout);
@@ -138,10 +140,11 @@ TEST(RedCell, TreadsAsTheBoundaryIntegral) {
   for (const double dx : spacings) {
     char name[32];
     std::snprintf(name, sizeof name, "dx = %.3f um", dx);
-    const auto r =
-        test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, data::Coupling{}.retraction, dx);
+    const auto r = test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, {}, dx);
     error.push_back(print(name, r) / exact - 1);
   }
+  print("dx = 0.500 um, phi3",
+        test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, test::phi3_coupling()));
   EXPECT_LT(std::abs(error.back()), std::abs(error.front())) << "does not converge";
 }
 

@@ -179,13 +179,13 @@ TEST(Rheology, ViscosityOverTheCoupling) {
   SuspensionCase c;
   c.box = {15, 15, 15}, c.strain = 8;
   const auto cells = pack(test::suspension_scene(c, 1));
-  std::printf("| θ | χ | worst volume |%s\n", columns);
+  std::printf("| θ | χ | retraction | worst volume |%s\n", columns);
   const data::Coupling shipped;
   double reference = 0;
   const auto run = [&](double theta, double chi) {
     c.coupling.theta_n = c.coupling.theta_t = theta, c.coupling.chi = chi;
     const auto r = test::shear_suspension(c, cells, test::suspension_scene(c, 1));
-    std::printf("| %.2f | %.2f | %.4f |", theta, chi, r.volume);
+    std::printf("| %.2f | %.2f | %.2f | %.4f |", theta, chi, c.coupling.retraction, r.volume);
     print_row({r});
     EXPECT_NEAR(r.volume, 1, 0.02);
     if (reference == 0) reference = r.viscosity;
@@ -193,6 +193,9 @@ TEST(Rheology, ViscosityOverTheCoupling) {
   run(shipped.theta_n, shipped.chi);
   for (const double theta : {0.99, 0.9, 0.8, 0.5}) run(theta, shipped.chi);
   for (const double chi : {1.5, 2.0}) run(shipped.theta_n, chi);
+  std::printf("phi3\n");
+  c.coupling = test::phi3_coupling();
+  for (const double theta : {0.97, 0.9}) run(theta, c.coupling.chi);
 }
 
 }  // namespace

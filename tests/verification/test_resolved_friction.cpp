@@ -37,5 +37,15 @@ TEST(SheetFriction, WithoutRetractionASheetIsHalfASpacingTooThick) {
   }
 }
 
+// phi3 smears a sheet less, and less retraction is right at all gaps at once. Its response summed over a
+// sheet is 1/4 in place of 3/16, hence chi 2 in place of 8/3.
+TEST(SheetFriction, WithPhi3ItIsRightFromOneSpacingUp) {
+  for (const double gap : {0.5, 1.0, 2.0, 4.0}) {
+    test_support::SheetCase c;
+    c.gap = gap, c.kernel = ibm::Kernel::phi3, c.retraction = 0.35, c.chi = 2;
+    EXPECT_NEAR(mean_over_offsets(c), 1, gap < 1 ? 0.16 : 0.04) << "gap " << gap << " dx";
+  }
+}
+
 }  // namespace
 }  // namespace hemowalk::resolved
