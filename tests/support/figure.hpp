@@ -70,10 +70,10 @@ class Figure {
     FILE* plot = popen("gnuplot 2>/dev/null", "w");
     if (!plot) return;
     std::fprintf(plot,
-                 "set encoding utf8\nset terminal svg size 640,440 font 'sans-serif,13' background "
+                 "set encoding utf8\nset terminal svg size 860,400 font 'sans-serif,13' background "
                  "'#ffffff'\nset output '%s.svg'\n"
                  "set title '%s' noenhanced\nset xlabel '%s' noenhanced\nset ylabel '%s' noenhanced\n"
-                 "set grid lc rgb '#dddddd'\nset key outside below center horizontal noenhanced samplen 2\n"
+                 "set grid lc rgb '#dddddd'\nset key outside right center noenhanced samplen 2\n"
                  "set border 3 lc rgb '#444444'\nset tics nomirror\n%s",
                  stem.c_str(), title_.c_str(), x_.c_str(), y_.c_str(), settings_.c_str());
     for (std::size_t i = 0; i < curves_.size(); ++i) {
