@@ -34,8 +34,7 @@ class Figure {
     return *this;
   }
 
-  /// \returns the folder written to.
-  std::string write() const {
+  void write() const {
     const char* chosen = std::getenv("HEMOWALK_FIGURES");
     const std::filesystem::path folder = chosen ? chosen : "figures";
     std::filesystem::create_directories(folder);
@@ -52,7 +51,6 @@ class Figure {
     table.close();
     draw(stem);
     std::printf("figure: %s.csv\n", stem.c_str());
-    return folder.string();
   }
 
  private:
@@ -67,7 +65,8 @@ class Figure {
     // Okabe and Ito 2008: told apart by colour-blind readers too.
     static const char* const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                           "#e69f00", "#56b4e9", "#000000", "#b8a800"};
-    FILE* plot = popen("gnuplot 2>/dev/null", "w");
+    const std::string script = stem + ".gnuplot";
+    FILE* plot = std::fopen(script.c_str(), "w");
     if (!plot) return;
     std::fprintf(plot,
                  "set encoding utf8\nset terminal svg size 860,400 font 'sans-serif,13' background "
@@ -95,7 +94,10 @@ class Figure {
           std::fprintf(plot, "%.6g %.6g %.6g\n", c.x[i], c.y[i], c.error.empty() ? 0. : c.error[i]);
       std::fprintf(plot, "e\n");
     }
-    pclose(plot);
+    std::fclose(plot);
+    if (std::system(("gnuplot '" + script + "' > /dev/null 2>&1").c_str()) != 0)
+      std::printf("no drawing: gnuplot is missing or failed\n");
+    std::filesystem::remove(script);
   }
 
   std::string name_, title_, x_, y_, settings_;

@@ -16,6 +16,18 @@ namespace {
 
 using test::Shares;
 
+/// Runs to the strain \p end at 100 1/s; sampled 200 times per run from the part \p from of it on.
+Shares sheared(Simulation<float>& sim, double end, double from) {
+  const int steps = static_cast<int>(end / sim.units().rate(100));
+  Shares shares;
+  for (int i = 0; i < steps; ++i)
+    if (i > from * steps && i % (steps / 200) == 0)
+      shares.sample(sim);
+    else
+      sim.step();
+  return shares;
+}
+
 /// Neo-Hookean capsule, Ca 0.1, radius 2.5 um = \p nodes dx, box of 6 radii, steady from a strain of 4 on.
 Shares capsule(double nodes, double acceleration) {
   const double a = 2.5e-6, rate = 100, box = 15;
@@ -28,14 +40,7 @@ Shares capsule(double nodes, double acceleration) {
   auto scene = test::shear_scene({box, box, box}, acceleration, {kind});
   scene.fluid.dx = a / nodes;
   Simulation<float> sim(scene, {{0, {3 * nodes + 0.2, 3 * nodes, 3 * nodes}, mesh::identity_rotation, {}}});
-  const int steps = static_cast<int>(5 / sim.units().rate(rate));
-  Shares shares;
-  for (int i = 0; i < steps; ++i)
-    if (i > 0.8 * steps && i % (steps / 200) == 0)
-      shares.sample(sim);
-    else
-      sim.step();
-  return shares;
+  return sheared(sim, 5, 0.8);
 }
 
 /// Red cell that tumbles, over half a turn.
@@ -43,14 +48,7 @@ Shares red_cell(double kappa, double acceleration, double dx = 0.5) {
   auto scene = test::shear_scene({14, 16, 14}, acceleration, {test::red_cell_kind(kappa)});
   scene.fluid.dx = 1e-6 * dx;
   Simulation<float> sim(scene, {{0, {7 / dx, 8 / dx, 7 / dx}, mesh::rotation({1, 0, 0}, 0.5), {}}});
-  const int steps = static_cast<int>(6 / sim.units().rate(100));
-  Shares shares;
-  for (int i = 0; i < steps; ++i)
-    if (i > 0.2 * steps && i % (steps / 200) == 0)
-      shares.sample(sim);
-    else
-      sim.step();
-  return shares;
+  return sheared(sim, 6, 0.2);
 }
 
 // What no term names stays below 1e-4 of the walls' power (measured: 1e-5); what the lattice takes for

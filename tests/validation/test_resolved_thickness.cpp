@@ -79,6 +79,18 @@ TEST(HydrodynamicThickness, OverRetraction) {
   }
 }
 
+// What the narrower kernel makes of a sphere, and of a platelet whose coupling points are fitted to phi4.
+TEST(HydrodynamicThickness, WithPhi3) {
+  BodyCase sphere = sphere_case(0), disc;
+  sphere.coupling = disc.coupling = test::phi3_coupling();
+  const double rotation = test::rotation_rate(sphere), drag = test::stokes_radius(sphere, 2) / 2.5;
+  const Platelet p = platelet(disc, 4);
+  std::printf("phi3, sphere: omega/gamma %.4f, drag %.3f | platelet: period gamma %.2f, drag %.3f %.3f\n",
+              rotation, drag, p.period, p.broadside, p.edgewise);
+  EXPECT_NEAR(rotation, test::rotation_rate(sphere_case(0)), 0.02 * rotation);
+  EXPECT_NEAR(drag, 1, 0.03);
+}
+
 TEST(HydrodynamicThickness, OverLatticeSpacing) {
   std::printf("dx/um  n | platelet: period gamma, drag broadside, edgewise (retraction %.2f)\n",
               data::Coupling{}.retraction);

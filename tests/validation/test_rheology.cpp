@@ -148,6 +148,15 @@ TEST(Rheology, ViscosityAndPowerOverLatticeSpacing) {
   EXPECT_NEAR(runs[1].viscosity / runs[2].viscosity, 1, 0.06);
   for (const int i : {0, 1}) EXPECT_LT(runs[i + 1].power.numerical(), 0.75 * runs[i].power.numerical());
   for (const int subdivision : {12, 16}) runs.push_back(run(0.5, subdivision));
+  std::printf("phi3\n");
+  c.coupling = test::phi3_coupling();
+  for (const int subdivision : {8, 12}) {
+    // Less slip; the stress does not tell the kernels apart.
+    const auto r = run(0.5, subdivision);
+    const auto& wide = runs[subdivision == 8 ? 0 : 3];
+    EXPECT_LT(r.power.sum.slip / r.power.sum.fed(), 0.7 * wide.power.sum.slip / wide.power.sum.fed());
+    EXPECT_NEAR(r.viscosity / wide.viscosity, 1, 0.03);
+  }
   // With the same mesh the stress that dx 0.5 um adds is what the lattice takes for itself (0.153, 0.175);
   // the rest of the 16 % is the coarse mesh's.
   const auto numerical = [](const SuspensionResult& r) { return r.power.numerical() * r.viscosity; };
