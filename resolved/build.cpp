@@ -113,31 +113,38 @@ mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit) {
 
 namespace {
 
-/// How far the faces of a platelet are drawn back, in units of the retraction of a flat sheet; \p
-/// half_thickness in dx. Two faces that share kernels must come closer the thinner the platelet is. Measured
-/// (Jeffery period), linear in between: docs/evidence/validation.md, section 1.
-double platelet_face_depth(double half_thickness) {
-  constexpr std::array<std::array<double, 2>, 6> measured{
-      {{0.917, 1.245}, {1.1, 1.48}, {1.375, 1.767}, {1.65, 1.967}, {1.85, 1.90}, {2.2, 1.55}}};
-  std::size_t i = 1;
-  while (i + 1 < measured.size() && half_thickness > measured[i][0]) ++i;
-  const auto [x0, y0] = measured[i - 1];
-  const auto [x1, y1] = measured[i];
-  return std::max(1.0, y0 + (y1 - y0) * (half_thickness - x0) / (x1 - x0));
-}
+/// How far a platelet is drawn back, in units of the retraction of a flat sheet: its rim (fitted to the drag)
+/// and its faces, over the half thickness in dx (fitted to the Jeffery period, linear in between). Two faces
+/// that share kernels must come closer the thinner the platelet is. docs/evidence/validation.md, section 1.
+struct PlateletFit {
+  double rim;
+  std::array<std::array<double, 2>, 6> faces;  ///< {half thickness, depth}
+
+  double face(double half_thickness) const {
+    std::size_t i = 1;
+    while (i + 1 < faces.size() && half_thickness > faces[i][0]) ++i;
+    const auto [x0, y0] = faces[i - 1];
+    const auto [x1, y1] = faces[i];
+    return std::max(1.0, y0 + (y1 - y0) * (half_thickness - x0) / (x1 - x0));
+  }
+};
+constexpr PlateletFit with_phi4{
+    1.58, {{{0.917, 1.245}, {1.1, 1.48}, {1.375, 1.767}, {1.65, 1.967}, {1.85, 1.90}, {2.2, 1.55}}}};
+constexpr PlateletFit with_phi3{
+    1.714, {{{0.917, 1.914}, {1.1, 2.151}, {1.375, 2.191}, {1.65, 1.857}, {1.833, 1.557}, {2.2, 1.18}}}};
 
 }  // namespace
 
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
-                                        double retraction) {
-  constexpr double rim = 1.58;  // in units of the retraction, likewise measured (drag)
+                                        const data::Coupling& coupling) {
+  const double retraction = coupling.retraction;
   std::vector<mesh::Vec3> points = rest.vertices;
   if (kind.shape.type == data::Shape::Type::platelet) {
     mesh::Vec3 radius{};
     for (const auto& p : points)
       for (int d = 0; d < 3; ++d) radius[d] = std::max(radius[d], p[d]);
-    const double face = platelet_face_depth(radius[1]);
-    const mesh::Vec3 depth{rim * retraction, face * retraction, rim * retraction};
+    const PlateletFit& fit = coupling.kernel == data::Coupling::Kernel::phi4 ? with_phi4 : with_phi3;
+    const mesh::Vec3 depth{fit.rim * retraction, fit.face(radius[1]) * retraction, fit.rim * retraction};
     for (int d = 0; d < 3; ++d)
       require(depth[d] < radius[d], [&] {
         return "cells.kinds." + kind.name + " is too thin for coupling.retraction (its half thickness of " +

@@ -31,7 +31,7 @@ mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
 /// retraction (lattice units). A platelet's rim is sharper than that, its normals would cross: it becomes a
 /// smaller spheroid instead. \throws InputError when nothing would be left of it.
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
-                                        double retraction);
+                                        const data::Coupling& coupling);
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);
 /// The pairwise law; of contact.model: particle_in_kernel the one it is packed with.
 contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units);

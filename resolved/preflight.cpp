@@ -17,8 +17,8 @@ using data::Scene;
 
 constexpr double largest_wall_speed = 0.1;        // lattice units; compressibility error ~ Ma^2 = 3 u^2
 constexpr double largest_capsule_reynolds = 0.1;  // end of the Stokes regime (method 6)
-constexpr double widest_mesh = 2.2;               // mean edge in dx: wider meshes leak through phi4
-constexpr double narrowest_mesh = 0.2;            // mean edge in dx: markers that phi4 cannot tell apart
+constexpr double widest_mesh = 2.2;               // mean edge in dx: wider meshes leak
+constexpr double narrowest_mesh = 0.2;            // mean edge in dx: markers that a kernel cannot tell apart
 
 void check_available(const Scene& scene, std::vector<std::string>& problems) {
   using Geometry = data::Domain::Geometry;
@@ -87,7 +87,7 @@ void check_cells(const Scene& scene, const LatticeUnits& units, std::vector<std:
     mesh::TriangleMesh rest;
     try {
       rest = make_mesh(kind, units.dx);
-      if (kind.law == data::Kind::Law::rigid) coupling_points(kind, rest, scene.coupling.retraction);
+      if (kind.law == data::Kind::Law::rigid) coupling_points(kind, rest, scene.coupling);
     } catch (const Error& error) {
       problems.push_back("cells.kinds." + kind.name + ".shape: " + error.what());
       continue;

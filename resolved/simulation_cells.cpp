@@ -27,7 +27,7 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
     mesh::TriangleMesh rest = make_mesh(k, units_.dx);
     const bool is_rigid = k.law == data::Kind::Law::rigid;
     mesh::TriangleMesh held = rest;
-    if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling.retraction);
+    if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling);
     const std::vector<double> area = mesh::vertex_areas(held);
     const double density = k.density / units_.density,
                  displaced =

@@ -46,17 +46,27 @@ struct Fluid {
 
 struct Coupling {
   enum class Scheme { conservative, paper, peskin } scheme = Scheme::conservative;
-  enum class Kernel { phi2, phi3, phi4 } kernel = Kernel::phi4;
+  enum class Kernel { phi2, phi3, phi4 } kernel = Kernel::phi3;
   int cycles = 1;
   int solid_every = 1;                    ///< fluid steps per solid step
-  double retraction = 0.6;                ///< delta, in dx (method: thickness of a smeared sheet)
+  double retraction = 0.35;               ///< delta, in dx (method: thickness of a smeared sheet)
   double theta_n = 0.97, theta_t = 0.97;  ///< slip correction, normal and tangential
-  double chi = 8.0 / 3.0;
+  double chi = 2;
   std::optional<double> velocity_cap;  ///< lattice units
   std::optional<double> force_cap;     ///< N, peskin
   bool median_filter = false;
   int iterations = 1;  ///< solid iterations per coupling step (conservative)
   enum class Integrator { implicit, runge_kutta } integrator = Integrator::implicit;  ///< of the membranes
+
+  /// What belongs to a kernel: the retraction that gives two sliding sheets their friction, and chi, half the
+  /// inverse of its response summed over a sheet (docs/evidence/validation.md, section 1).
+  static Coupling with(Kernel kernel) {
+    Coupling c;
+    c.kernel = kernel;
+    if (kernel == Kernel::phi4) c.retraction = 0.6, c.chi = 8.0 / 3.0;
+    if (kernel == Kernel::phi2) c.retraction = 0.2, c.chi = 0.75;  // its response varies: 3/2 is unstable
+    return c;
+  }
 };
 
 struct Contact {

@@ -72,24 +72,39 @@ Field coupling() {
       ours{"conservative", "peskin"}, others{"paper", "peskin"};
   const Field every = integer().at_least(1).at_most(1000), shift = number().at_least(0).at_most(2);
   const Coupling usual;  // numbers found by calibration stand in one place, the struct
+  using Kernel = Coupling::Kernel;
+  const Field kernel = choice({"phi2", "phi3", "phi4"});
+  const auto retraction = [&](Kernel k, const std::string& word) {
+    return with_default("retraction", shift, format_number(Coupling::with(k).retraction),
+                        "distance of the coupling surface inside the membrane, in dx")
+        .when("scheme", conservative)
+        .when("kernel", {word});
+  };
+  const auto chi = [](Kernel k, const std::string& word) {
+    return with_default("chi", number().above(0).at_most(100), format_number(Coupling::with(k).chi),
+                        "coupling mass, in rho A dx")
+        .when("kernel", {word});
+  };
   const Field cap = any_of({choice({"off"}), number().above(0).at_most(0.5)});
   return map_of({
       with_default("scheme", choice({"conservative", "paper", "peskin"}), "conservative",
                    "how cells and plasma exchange momentum"),
-      with_default("kernel", choice({"phi2", "phi3", "phi4"}), "phi4", "regularised delta function"),
+      with_default("kernel", kernel, "phi3", "regularised delta function").when("scheme", conservative),
+      with_default("kernel", kernel, "phi4", "regularised delta function").when("scheme", others),
       with_default("cycles", integer().at_least(1).at_most(100), "1", "multi-direct-forcing cycles"),
       with_default("solid_every", every, "1", "fluid steps per solid step").when("scheme", ours),
       with_default("solid_every", every, "2", "fluid steps per solid step").when("scheme", paper),
-      with_default("retraction", shift, format_number(usual.retraction),
-                   "distance of the coupling surface inside the membrane, in dx")
-          .when("scheme", conservative),
+      retraction(Kernel::phi2, "phi2"),
+      retraction(Kernel::phi3, "phi3"),
+      retraction(Kernel::phi4, "phi4"),
       with_default("retraction", shift, "0", "distance of the coupling surface inside the membrane, in dx")
           .when("scheme", others),
       with_default("theta", list_of(number().at_least(0).at_most(1), 2, 2),
                    "[" + format_number(usual.theta_n) + ", " + format_number(usual.theta_t) + "]",
                    "slip correction, normal and tangential"),
-      with_default("chi", number().above(0).at_most(100), format_number(usual.chi),
-                   "coupling mass, in rho A dx"),
+      chi(Kernel::phi2, "phi2"),
+      chi(Kernel::phi3, "phi3"),
+      chi(Kernel::phi4, "phi4"),
       with_default("velocity_cap", cap, "off", "largest velocity handed to a vertex, lattice units")
           .when("scheme", ours),
       with_default("velocity_cap", cap, "0.03", "largest velocity handed to a vertex, lattice units")

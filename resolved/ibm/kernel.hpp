@@ -33,13 +33,20 @@ HEMO_HD inline Weights<T> phi2(const T& f) {
   return {T(0) * f, T(1) - f, f, T(0) * f};
 }
 
+/// 0 or 1: which of the nodes at 0 and 1 a marker at fraction f is nearest to.
+template <class T>
+HEMO_HD inline T nearest_node(const T& f) {
+  using std::floor;
+  return floor(f + T(0.5f));
+}
+
 /// Three-point function: phi(r) = (1 + sqrt(1 - 3 r^2))/3 for |r| <= 1/2; the outer two weights follow from
 /// zeroth and first moment.
 template <class T>
 HEMO_HD inline Weights<T> phi3(const T& f) {
-  using std::floor, std::sqrt;
-  const T right = floor(f + T(0.5f)), left = T(1) - right;  // which node is nearest: one of them is 1
-  const T r = f - right;                                    // marker relative to it
+  using std::sqrt;
+  const T right = nearest_node(f), left = T(1) - right;  // one of them is 1
+  const T r = f - right;                                 // marker relative to it
   const T centre = (T(1) + sqrt(T(1) - T(3) * r * r)) / T(3);
   const T upper = (T(1) - centre + r) * T(0.5f), lower = (T(1) - centre - r) * T(0.5f);
   return {left * lower, left * centre + right * lower, left * upper + right * centre, right * upper};

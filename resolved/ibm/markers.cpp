@@ -34,6 +34,17 @@ HEMO_INLINE void weigh(const Real* fraction, WeightBlock<Real>& out) {
   }
 }
 
+/// Rows of nodes along y or z whose weights are not zero by construction, and the first of the four.
+template <Kernel kernel>
+constexpr int rows = kernel == Kernel::phi4   ? 4
+                     : kernel == Kernel::phi3 ? 3
+                                              : 2;
+template <Kernel kernel, class Real>
+HEMO_INLINE int first_row(Real fraction) {
+  if constexpr (kernel == Kernel::phi3) return static_cast<int>(nearest_node(fraction));
+  return kernel == Kernel::phi4 ? 0 : 1;
+}
+
 /// One node: four numbers in a register. A kernel row is four of them, one cache line in single precision.
 template <class Real>
 using Quad = Pack<Real, 4>;
@@ -222,15 +233,23 @@ void Markers<Real>::sort(View<const Origin> origin, View<const Node4<Real>> loca
   ++sorts_;
 }
 
-/// Asks for the 16 rows of nodes under a kernel.
-template <int write, class Real>
+/// Asks for the rows of nodes under a kernel.
+template <Kernel kernel, int write, class Real>
 HEMO_INLINE void prefetch_rows(const Node4<Real>* base, std::size_t row, std::size_t plane) {
-  for (int c = 0; c < 4; ++c)
-    for (int b = 0; b < 4; ++b) {
+  for (int c = 0; c < rows<kernel>; ++c)
+    for (int b = 0; b < rows<kernel>; ++b) {
       const auto* p = reinterpret_cast<const char*>(base + c * plane + b * row);
       __builtin_prefetch(p, write, 3);
       __builtin_prefetch(p + 4 * sizeof(Node4<Real>) - 1, write, 3);
     }
+}
+
+/// The first node under the kernel of the marker at a slot, or of the last one.
+template <class Real>
+template <Kernel kernel>
+HEMO_INLINE const Node4<Real>* Markers<Real>::under_kernel(const Node4<Real>* field, std::size_t slot) const {
+  const Site& s = sites_[std::min<std::size_t>(slot, active_ - 1)];
+  return field + s.base + first_row<kernel>(s.fz) * block_.plane() + first_row<kernel>(s.fy) * block_.row();
 }
 
 template <class Real>
@@ -248,13 +267,13 @@ void Markers<Real>::interpolate_with(View<const Node4<Real>> field, View<Node4<R
     WeightBlock<Real> wx, wy, wz;
     weigh<kernel>(fx, wx), weigh<kernel>(fy, wy), weigh<kernel>(fz, wz);
     for (int l = 0; l < group; ++l) {
-      const Node4<Real>* base = field.data + sites_[first + l].base;
-      prefetch_rows<0>(field.data + sites_[std::min<std::ptrdiff_t>(first + l + ahead, active_ - 1)].base,
-                       row, plane);
+      const int b0 = first_row<kernel>(fy[l]), c0 = first_row<kernel>(fz[l]);
+      const Node4<Real>* base = field.data + sites_[first + l].base + c0 * plane + b0 * row;
+      prefetch_rows<kernel, 0>(under_kernel<kernel>(field.data, first + l + ahead), row, plane);
       Row<Real> sum[2] = {Row<Real>::zero(), Row<Real>::zero()};
-      for (int c = 0; c < 4; ++c)
-        for (int b = 0; b < 4; ++b)
-          sum[b & 1].add(Row<Real>::load(base + c * plane + b * row), wy.w[b][l] * wz.w[c][l]);
+      for (int c = 0; c < rows<kernel>; ++c)
+        for (int b = 0; b < rows<kernel>; ++b)
+          sum[b & 1].add(Row<Real>::load(base + c * plane + b * row), wy.w[b0 + b][l] * wz.w[c0 + c][l]);
       sum[0].add(sum[1]);
       alignas(64) Node4<Real> nodes[4];
       sum[0].store(nodes);
@@ -285,13 +304,13 @@ void Markers<Real>::spread_with(View<const Node4<Real>> value, View<Node4<Real>>
           Quad<Real> v = load_node(value.data + marker_[first + l]);
           v[3] = Real(0);
           const auto share = Row<Real>::join(v * wx.w[0][l], v * wx.w[1][l], v * wx.w[2][l], v * wx.w[3][l]);
-          Node4<Real>* base = field.data + sites_[first + l].base;
-          prefetch_rows<1>(field.data + sites_[std::min<std::size_t>(first + l + ahead, active_ - 1)].base,
-                           row, plane);
-          for (int c = 0; c < 4; ++c)
-            for (int b = 0; b < 4; ++b) {
+          const int b0 = first_row<kernel>(fy[l]), c0 = first_row<kernel>(fz[l]);
+          Node4<Real>* base = field.data + sites_[first + l].base + c0 * plane + b0 * row;
+          prefetch_rows<kernel, 1>(under_kernel<kernel>(field.data, first + l + ahead), row, plane);
+          for (int c = 0; c < rows<kernel>; ++c)
+            for (int b = 0; b < rows<kernel>; ++b) {
               auto r = Row<Real>::load(base + c * plane + b * row);
-              r.add(share, wy.w[b][l] * wz.w[c][l]);
+              r.add(share, wy.w[b0 + b][l] * wz.w[c0 + c][l]);
               r.store(base + c * plane + b * row);
             }
         }

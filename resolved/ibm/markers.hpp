@@ -70,6 +70,8 @@ class Markers {
   bool place(View<const Origin> origin, View<const Node4<Real>> local);
   void sort(View<const Origin> origin, View<const Node4<Real>> local);
   template <Kernel kernel>
+  const Node4<Real>* under_kernel(const Node4<Real>* field, std::size_t slot) const;
+  template <Kernel kernel>
   void interpolate_with(View<const Node4<Real>> field, View<Node4<Real>> out) const;
   template <Kernel kernel>
   void spread_with(View<const Node4<Real>> value, View<Node4<Real>> field) const;

@@ -116,7 +116,7 @@ cells:
 domain:
   size: [0.05 mm, 5e-5 m, 50000 nm]
 fluid: {dx: 500 nm, tau: 2.0}
-coupling: {chi: 2.667, retraction: 0.7}
+coupling: {kernel: phi4, chi: 2.667, retraction: 0.7}
 time: {surface: 0.05 s}
 )";
   EXPECT_EQ(parse_scene(other, "t.yaml").source_text, parse_scene(blood, "s.yaml").source_text);
@@ -240,8 +240,26 @@ TEST(SchemaScene, TheSchemeOfThePaperBringsItsDefaults) {
   EXPECT_EQ(s.coupling.solid_every, 2);
   EXPECT_EQ(s.coupling.velocity_cap, 0.03);
   EXPECT_TRUE(s.coupling.median_filter);
+  EXPECT_EQ(s.coupling.kernel, Coupling::Kernel::phi4);
   EXPECT_EQ(s.coupling.retraction, 0);
   EXPECT_EQ(s.coupling.iterations, 4);
+}
+
+TEST(SchemaScene, AKernelBringsItsRetractionAndChi) {
+  const auto coupling = [](const std::string& keys) {
+    return parse_scene("format: hemowalk.scene/1\ncoupling: {" + keys + "}\n", "s.yaml").coupling;
+  };
+  for (const auto& [word, kernel] : {std::pair{"phi2", Coupling::Kernel::phi2},
+                                     {"phi3", Coupling::Kernel::phi3},
+                                     {"phi4", Coupling::Kernel::phi4}}) {
+    const Coupling c = coupling("kernel: " + std::string(word));
+    EXPECT_EQ(c.kernel, kernel);
+    EXPECT_EQ(c.retraction, Coupling::with(kernel).retraction) << word;
+    EXPECT_EQ(c.chi, Coupling::with(kernel).chi) << word;
+  }
+  EXPECT_NE(coupling("kernel: phi3").retraction, coupling("kernel: phi4").retraction);
+  EXPECT_EQ(coupling("cycles: 1").kernel, Coupling::Kernel::phi3);
+  EXPECT_EQ(coupling("kernel: phi4, retraction: 0.4").retraction, 0.4);
 }
 
 TEST(SchemaScene, PeskinIsCappedOnRequestAndParticleInKernelReachesFarther) {

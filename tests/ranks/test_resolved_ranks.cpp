@@ -323,7 +323,7 @@ TEST(RanksOfTheSolver, TooManyRanksAreRefused) {
 TEST(RanksOfTheSolver, OtherCouplingsAreRefusedOnSeveralRanks) {
   data::Scene scene = long_scene();
   scene.coupling.retraction = 0;
-  scene.coupling.scheme = data::Coupling::Scheme::paper;
+  scene.coupling.scheme = data::Coupling::Scheme::paper, scene.coupling.kernel = data::Coupling::Kernel::phi4;
   on(1, [&](const mpi::Ranks& ranks) { EXPECT_NO_THROW(Simulation<float>(scene, crowd(), ranks)); });
   on(2, [&](const mpi::Ranks& ranks) { EXPECT_THROW(Simulation<float>(scene, crowd(), ranks), InputError); });
 }

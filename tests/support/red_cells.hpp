@@ -33,7 +33,8 @@ inline data::Kind platelet_kind() {
 /// particle_in_kernel`.
 inline void use_paper_coupling(data::Scene& scene) {
   data::Coupling& c = scene.coupling;
-  c.scheme = data::Coupling::Scheme::paper, c.retraction = 0, c.solid_every = 2, c.iterations = 4;
+  c.scheme = data::Coupling::Scheme::paper, c.kernel = data::Coupling::Kernel::phi4, c.retraction = 0,
+  c.solid_every = 2, c.iterations = 4;
   c.velocity_cap = 0.03, c.median_filter = true;
   scene.contact.model = data::Contact::Model::particle_in_kernel, scene.contact.range = 1e-6;
 }

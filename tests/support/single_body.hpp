@@ -18,14 +18,6 @@ struct BodyCase {
   mesh::Quaternion orientation = mesh::identity_rotation;
 };
 
-/// The three-point kernel with the retraction that two sheets ask of it (SheetFriction.WithPhi3...) and chi
-/// from its response summed over a sheet, 1/4.
-inline data::Coupling phi3_coupling() {
-  data::Coupling c;
-  c.kernel = data::Coupling::Kernel::phi3, c.retraction = 0.35, c.chi = 2;
-  return c;
-}
-
 inline data::Shape sphere_shape(double radius) {
   data::Shape shape;
   shape.type = data::Shape::Type::sphere, shape.radii = {1e-6 * radius, 1e-6 * radius, 1e-6 * radius};

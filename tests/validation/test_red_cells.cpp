@@ -143,8 +143,8 @@ TEST(RedCell, TreadsAsTheBoundaryIntegral) {
     const auto r = test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, {}, dx);
     error.push_back(print(name, r) / exact - 1);
   }
-  print("dx = 0.500 um, phi3",
-        test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, test::phi3_coupling()));
+  const auto wide = data::Coupling::with(data::Coupling::Kernel::phi4);
+  print("dx = 0.500 um, phi4", test::red_cell_in_shear(5, 0, strain, {}, 0.5, rate, from, wide));
   EXPECT_LT(std::abs(error.back()), std::abs(error.front())) << "does not converge";
 }
 
@@ -215,7 +215,8 @@ TEST(PairCollision, UnderTheThreeCouplings) {
   const char* partner = std::getenv("HEMOWALK_PARTNER");  // red_cell, platelet: only this one
   const auto as_it_is = [](data::Scene&) {};
   const auto peskin = [](data::Scene& scene) {
-    scene.coupling.scheme = data::Coupling::Scheme::peskin, scene.coupling.retraction = 0;
+    scene.coupling.scheme = data::Coupling::Scheme::peskin, scene.coupling.retraction = 0,
+    scene.coupling.kernel = data::Coupling::Kernel::phi4;
   };
   for (const bool platelet : {false, true}) {
     if (partner && platelet != (std::string(partner) == "platelet")) continue;

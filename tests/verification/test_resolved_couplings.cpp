@@ -20,6 +20,7 @@ data::Scene scene_of(Scheme scheme, double acceleration = 8) {
   scene.domain.size = {12e-6, 14e-6, 12e-6};
   scene.acceleration = acceleration;
   scene.coupling.scheme = scheme, scene.coupling.retraction = 0;
+  if (scheme != Scheme::conservative) scene.coupling.kernel = data::Coupling::Kernel::phi4;
   data::Kind rbc;
   rbc.name = "rbc";
   if (scheme == Scheme::peskin) rbc.kappa_damping = 0;

@@ -23,7 +23,7 @@ TEST(Platelet, TurnsWithJefferysPeriod) {
   EXPECT_NEAR(period / test::exact_jeffery_period(1.8 / 0.55), 1, 0.05);
 }
 
-// With 0.9 dx for the faces, right at 0.5 and 0.25 um, it would be 10 % short.
+// With the depth of a flat sheet for the faces it would be 8 % short.
 TEST(Platelet, TurnsWithJefferysPeriodOnAFinerLattice) {
   EXPECT_NEAR(test::jeffery_period(platelet(1.0 / 3, 6)) / test::exact_jeffery_period(1.8 / 0.55), 1, 0.05);
 }
@@ -37,7 +37,7 @@ TEST(Platelet, HasOberbecksDrag) {
 
 TEST(Platelet, TooThinForTheRetractionIsRefused) {
   auto c = platelet();
-  c.coupling.retraction = 0.8;  // 1.48 times that is more than the half thickness of 1.1 dx
+  c.coupling.retraction = 0.6;  // 2.15 times that is more than the half thickness of 1.1 dx
   EXPECT_THROW(Simulation<double>(test::scene_of(c), {test::body_of(c)}), InputError);
 }
 
