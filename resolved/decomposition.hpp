@@ -49,7 +49,7 @@ class Decomposition {
 };
 
 /// What a message is about.
-enum class Topic { velocity, force, populations, reach, copies, readings, impulses, cells };
+enum class Topic { velocity, force, populations, reach, copies, readings, impulses, cells, solid };
 
 /// Messages of one topic to and from both neighbours. Two ranks are each other's neighbour on both sides:
 /// what travels up and what travels down is told apart.

@@ -99,9 +99,10 @@ void DeviceSolid<Real>::Share::cut(int number) {
   const Place place = queue.place();
   const std::size_t n = host.batches * host.batch_size();
   parts.clear(), pinned.clear();
-  for (const void* field : {static_cast<const void*>(host.predicted), static_cast<const void*>(host.offset),
-                            static_cast<const void*>(host.velocity), static_cast<const void*>(host.normal)})
-    pinned.emplace_back(place, field, n * sizeof(Real));
+  for (const Real* field : {host.predicted, host.offset, host.velocity, host.normal, host.held})
+    if (field) pinned.emplace_back(place, field, n * sizeof(Real));
+  pinned.emplace_back(place, host.anchor, 3 * mesh::lanes_of<Real> * host.batches * sizeof(double));
+  if (host.motion) pinned.emplace_back(place, host.motion, group.count() * sizeof(rigid::BodyMotion));
   for (int p = 0; p < number; ++p) {
     const int first = host.batches * p / number, last = host.batches * (p + 1) / number;
     if (last > first) parts.push_back(std::make_unique<Part>(place, first, last - first, host.batch_size()));
@@ -146,6 +147,9 @@ void DeviceSolid<Real>::Share::enqueue(Part& part, const mesh::StepOptions& opti
         part.queue.for_each(
             n, ToLanes<Real>{host.vertices, count, fields, part.anchor.data(), part.offset.data(),
                              part.velocity.data(), part.normal.data(), part.held.data()});
+        if constexpr (requires { cells.motion(); })
+          part.queue.copy(host.motion + first_cell, cells.motion() + first_cell,
+                          static_cast<std::size_t>(count));
       },
       cells);
   part.queue.copy(host.offset + start, part.offset.data(), n);

@@ -1,8 +1,8 @@
 #pragma once
 /// \file DeviceSolid: only the cells' step on the device, fluid, coupling and contact on the host (the
 /// paper's hybrid). The groups are cut into equal parts, each with a queue of its own, so that one part is
-/// copied while another computes: v_pred goes up; positions, velocities and normals come down. The rest of
-/// the state stays on the device.
+/// copied while another computes: v_pred goes up; positions, velocities and normals come down. Membranes'
+/// rounding residuals stay on the device.
 
 #include <memory>
 #include <variant>
@@ -24,8 +24,7 @@ class DeviceSolid {
 
   /// One solid step of all groups, from and to the host's fields. \returns a report per group.
   std::vector<mesh::StepReport> step(const mesh::StepOptions& options);
-  /// What the host's fields do not hold (rounding residuals, orientations) comes down too: for checkpoints
-  /// and output.
+  /// What the host's fields do not hold (rounding residuals) comes down too: for checkpoints and output.
   void download();
   /// Before cells come to the groups or go: all of their state is there, and their memory may move.
   void give_back();

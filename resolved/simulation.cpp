@@ -189,7 +189,7 @@ void Simulation<Real>::move_cells() {
   for (auto& group : groups_) {
     const auto report = solid_.step ? reports[static_cast<std::size_t>(&group - groups_.data())]
                                     : std::visit([&](auto& g) { return g.step(options); }, group.cells);
-    check_finite(group, report);
+    check_finite(moved()[static_cast<std::size_t>(&group - groups_.data())], report);
     solid_report_.increment = std::max(solid_report_.increment, report.increment);
   }
 }

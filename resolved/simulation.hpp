@@ -120,12 +120,17 @@ class Simulation {
   View<const Node4<Real>> velocity() const { return velocity_.view(); }
   /// Who moves the cells instead of the groups themselves (place.solid: device).
   struct SolidElsewhere {
-    /// From predicted() to positions, velocities and normals; a report per group. Empty: the groups do it.
+    /// From predicted() to positions, velocities and normals; a report per group of `moved` (all). Empty: the
+    /// groups do it.
     std::function<std::vector<mesh::StepReport>(const mesh::StepOptions&)> step;
-    std::function<void()> give_back;  ///< before cells come or go: all of their state into the groups
-    std::function<void()> take_over;  ///< after it
+    const std::vector<Group<Real>>* moved = nullptr;  ///< the cells that are moved on this rank
+    /// Before cells come or go: all of their state into the groups; after it.
+    std::function<void()> give_back, take_over;
+    std::function<void()> restart;  ///< a state was loaded (all)
   };
   void set_solid(SolidElsewhere solid) { solid_ = std::move(solid); }
+  /// The cells whose solid step this rank takes.
+  const std::vector<Group<Real>>& moved() const { return solid_.moved ? *solid_.moved : groups_; }
   /// Who advances the fluid instead of the lattice Boltzmann fluid: writes the velocity that markers read,
   /// with the given share of the force (all nodes, halo excepted). Empty: the fluid.
   using FluidStep =

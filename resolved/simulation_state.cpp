@@ -140,6 +140,7 @@ void Simulation<Real>::load(View<const std::byte> state) {
         },
         groups_[i].cells);
   if (solid_.take_over) solid_.take_over();
+  if (solid_.restart) solid_.restart();
   arrange();
   std::memset(static_cast<void*>(impulse_.data()), 0, impulse_.size() * sizeof(Node4<Real>));
   for (std::size_t i = 0; i < groups_.size(); ++i)

@@ -3,6 +3,7 @@
 #include "core/check.hpp"
 #include "resolved/device_simulation.hpp"
 #include "resolved/device_solid.hpp"
+#include "resolved/even_solid.hpp"
 
 namespace hemowalk::resolved {
 
@@ -20,6 +21,7 @@ struct Stepper<Real>::Impl {
   Queue queue;
   std::unique_ptr<DeviceSimulation<Real>> whole;
   std::unique_ptr<DeviceSolid<Real>> solid;
+  std::unique_ptr<EvenSolid<Real>> even;
 
   Impl(Simulation<Real>& s, Place place) : simulation(s), queue(place) {}
 };
@@ -37,17 +39,29 @@ Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
       "coupling.integrator runge_kutta on the device (its kernels know the implicit step) use place: host");
   if (place.fluid == Place::device) {
     impl_->whole = std::make_unique<DeviceSimulation<Real>>(impl_->queue, simulation);
+  } else if (place.distribution == data::Places::Distribution::even) {
+    impl_->even = std::make_unique<EvenSolid<Real>>(device, simulation.groups(), simulation.ranks(),
+                                                    simulation.timings());
+    EvenSolid<Real>* even = impl_->even.get();
+    simulation.set_solid({[even](const mesh::StepOptions& options) { return even->step(options); },
+                          &even->solved(),
+                          {},
+                          {},
+                          [even] { even->take_over(); }});
   } else {
     impl_->solid = std::make_unique<DeviceSolid<Real>>(device, simulation.groups());
     DeviceSolid<Real>* solid = impl_->solid.get();
     simulation.set_solid({[solid](const mesh::StepOptions& options) { return solid->step(options); },
-                          [solid] { solid->give_back(); }, [solid] { solid->take_over(); }});
+                          nullptr,
+                          [solid] { solid->give_back(); },
+                          [solid] { solid->take_over(); },
+                          {}});
   }
 }
 
 template <class Real>
 Stepper<Real>::~Stepper() {
-  if (impl_ && impl_->solid) impl_->simulation.set_solid({});
+  if (impl_ && (impl_->solid || impl_->even)) impl_->simulation.set_solid({});
 }
 
 template <class Real>
@@ -59,6 +73,7 @@ template <class Real>
 void Stepper<Real>::sync() {
   if (impl_->whole) impl_->whole->download(impl_->simulation);
   if (impl_->solid) impl_->solid->download();
+  if (impl_->even) impl_->even->download();
 }
 
 template <class Real>

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Stepper: takes a Simulation's steps where its scene says (place: fluid, coupling, solid). All on the
 /// host: the Simulation itself. All on the device: DeviceSimulation. The solid alone: the paper's hybrid,
-/// DeviceSolid.
+/// DeviceSolid or (place.distribution: even) EvenSolid.
 
 #include <cstdint>
 #include <memory>
@@ -19,7 +19,7 @@ template <class Real>
 class Stepper {
  public:
   /// \p simulation must outlive this and is left alone from now on but for sync(). \p device: where what
-  /// belongs on a device is to run; Place::host runs the device's kernels thread by thread, for tests.
+  /// belongs on a device is to run; Place::host runs the device's kernels thread by thread, for tests (all).
   /// \throws InputError when there is no device or it lacks something the scene asks for.
   Stepper(Simulation<Real>& simulation, Place device = Place::device);
   ~Stepper();
@@ -27,7 +27,7 @@ class Stepper {
   /// One coupling step. The Simulation may fall behind. \throws PhysicsError naming cell and step. \p budget:
   /// as Simulation::step(); zeros where the whole step is on the device.
   void step(EnergyBudget* budget = nullptr);
-  /// Brings the Simulation up to date.
+  /// Brings the Simulation up to date (all).
   void sync();
   std::int64_t fluid_steps() const;
 

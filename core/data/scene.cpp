@@ -206,7 +206,7 @@ Scene scene_of(const Value& v) {
   s.time = time_of(v["time"]);
   s.seed = static_cast<std::uint64_t>(v["seed"].integer());
   s.place = {v["place.fluid"].choice<Place>(), v["place.coupling"].choice<Place>(),
-             v["place.solid"].choice<Place>()};
+             v["place.solid"].choice<Place>(), v["place.distribution"].choice<Places::Distribution>()};
   return s;
 }
 

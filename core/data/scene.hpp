@@ -138,6 +138,7 @@ struct Time {
 
 struct Places {
   Place fluid = Place::host, coupling = Place::host, solid = Place::host;
+  enum class Distribution { with_fluid, even } distribution = Distribution::with_fluid;
 };
 
 /// Everything the resolved solver needs to know; all values physical (not scaled by acceleration).

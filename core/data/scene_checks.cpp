@@ -157,6 +157,18 @@ void check_time(const Value& v, Problems& problems) {
                        " s (from fluid.dx, tau, kinematic_viscosity and acceleration) use a longer time");
 }
 
+void check_place(const Value& v, Problems& problems) {
+  const Value *distribution = v.find("place.distribution"), *solid = v.find("place.solid"),
+              *fluid = v.find("place.fluid"), *coupling = v.find("place.coupling");
+  if (!distribution || distribution->text() != "even" || !solid || !fluid || !coupling) return;
+  if (solid->text() == "device" && fluid->text() == "host" && coupling->text() == "host") return;
+  problems.add(
+      distribution->mark,
+      "place.distribution: even without the solid alone on devices (elsewhere cells are solved where "
+      "their fluid is) "
+      "use place: {fluid: host, coupling: host, solid: device}, or remove it");
+}
+
 }  // namespace
 
 void check_scene(const Value& scene, Problems& problems) {
@@ -164,6 +176,7 @@ void check_scene(const Value& scene, Problems& problems) {
   check_flow(scene, problems);
   check_cells(scene, problems);
   check_time(scene, problems);
+  check_place(scene, problems);
 }
 
 }  // namespace hemowalk::data

@@ -241,9 +241,15 @@ Field time() {
 
 Field places() {
   const Field place = choice({"host", "device"});
-  return map_of({with_default("fluid", place, "host", "where the plasma lives"),
-                 with_default("coupling", place, "host", "where markers live"),
-                 with_default("solid", place, "host", "where cells live")});
+  return map_of(
+      {with_default("fluid", place, "host", "where the plasma lives"),
+       with_default("coupling", place, "host", "where markers live"),
+       with_default("solid", place, "host", "where cells live"),
+       with_default(
+           "distribution", choice({"with_fluid", "even"}), "with_fluid",
+           "with the solid alone on devices: a cell is solved by the rank of its fluid, or cells are "
+           "dealt out to all ranks in equal numbers, for good")
+           .not_physical()});
 }
 
 }  // namespace

@@ -172,7 +172,8 @@ Node time(const Time& t) {
 Node places(const Places& p) {
   return yaml::map({{"fluid", word("place.fluid", p.fluid)},
                     {"coupling", word("place.coupling", p.coupling)},
-                    {"solid", word("place.solid", p.solid)}});
+                    {"solid", word("place.solid", p.solid)},
+                    {"distribution", word("place.distribution", p.distribution)}});
 }
 
 }  // namespace

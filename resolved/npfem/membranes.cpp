@@ -173,6 +173,11 @@ const CellType& Membranes<Real>::type() const {
 }
 
 template <class Real>
+Membranes<Real> Membranes<Real>::empty() const {
+  return Membranes(impl_->type);
+}
+
+template <class Real>
 void Membranes<Real>::reserve(int cells) {
   impl_->reserve(cells);
 }

@@ -27,6 +27,8 @@ class Membranes {
  public:
   static constexpr int lanes = mesh::lanes_of<Real>;
   explicit Membranes(std::shared_ptr<const CellType> type);
+  /// The same type, no cells.
+  Membranes empty() const;
   ~Membranes();
   Membranes(Membranes&&) noexcept;
   Membranes& operator=(Membranes&&) noexcept;

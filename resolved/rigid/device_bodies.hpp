@@ -24,6 +24,7 @@ class DeviceBodies {
   void step(const StepOptions& options = {});
   /// [cell] torque beside what v_pred carries, for the next step.
   Vec3* couples() { return couple_.data(); }
+  const BodyMotion* motion() const { return motion_.data(); }  ///< [cell]
 
   /// Takes over any number of bodies.
   void upload(const RigidBodies<Real>& host);

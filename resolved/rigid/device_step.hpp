@@ -8,12 +8,6 @@
 
 namespace hemowalk::rigid {
 
-/// Six degrees of freedom.
-struct BodyMotion {
-  Quaternion orientation;
-  Vec3 velocity, spin;  ///< of the centre; angular
-};
-
 template <class Real>
 struct BodyStep {
   static constexpr int threads = 96, workers = 16;

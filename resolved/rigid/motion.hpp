@@ -12,6 +12,12 @@ using mesh::Matrix3;
 using mesh::Quaternion;
 using mesh::Vec3;
 
+/// Six degrees of freedom, but for the place of the centre.
+struct BodyMotion {
+  Quaternion orientation;
+  Vec3 velocity, spin;  ///< of the centre; angular
+};
+
 HEMO_HD inline Matrix3 transposed(const Matrix3& m) {
   return {m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]};
 }

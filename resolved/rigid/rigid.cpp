@@ -71,8 +71,8 @@ struct RigidBodies<Real>::Impl {
   int vertices;
   int capacity = 0;  ///< batches
   std::vector<std::int64_t> ids;
-  std::vector<Quaternion> orientation;
-  std::vector<Vec3> velocity_of_centre, spin, couple;
+  std::vector<BodyMotion> motion;
+  std::vector<Vec3> couple;
   Array<double> anchor;
   Array<Real> offset, held, velocity, normal, predicted;
 
@@ -93,9 +93,7 @@ struct RigidBodies<Real>::Impl {
     grow(anchor, static_cast<std::size_t>(batches) * 3 * lanes);
     const std::size_t cells_now = static_cast<std::size_t>(batches) * lanes;
     ids.reserve(cells_now);
-    orientation.resize(cells_now, mesh::identity_rotation);
-    velocity_of_centre.resize(cells_now, Vec3{});
-    spin.resize(cells_now, Vec3{});
+    motion.resize(cells_now, {mesh::identity_rotation, {}, {}});
     couple.resize(cells_now, Vec3{});
     for (int c = capacity * lanes; c < batches * lanes; ++c) place(c);
     capacity = batches;
@@ -103,7 +101,7 @@ struct RigidBodies<Real>::Impl {
 
   /// Offsets and normals from the orientation.
   void place(int c) {
-    const auto turn = mesh::matrix(orientation[c]);
+    const auto turn = mesh::matrix(motion[c].orientation);
     for (int k = 0; k < vertices; ++k) {
       const auto r = mesh::transform(turn, shape.arm[k]), n = mesh::transform(turn, shape.normal[k]),
                  s = mesh::transform(turn, shape.held[k]);
@@ -123,7 +121,7 @@ struct RigidBodies<Real>::Impl {
   }
 
   void step(int c, double velocity_cap) {
-    const auto turn = mesh::matrix(orientation[c]);
+    const auto turn = mesh::matrix(motion[c].orientation);
     Vec3 linear{}, angular = mesh::scale(type.h, couple[c]);
     couple[c] = {};
     for (int k = 0; k < vertices; ++k) {
@@ -134,8 +132,8 @@ struct RigidBodies<Real>::Impl {
       mesh::accumulate(linear, 1, p);
       mesh::accumulate(angular, 1, cross(r, p));
     }
-    velocity_of_centre[c] = mesh::scale(1 / shape.gyration.mass, linear);
-    spin[c] = shape.gyration.spin_of(angular, turn);
+    motion[c].velocity = mesh::scale(1 / shape.gyration.mass, linear);
+    motion[c].spin = shape.gyration.spin_of(angular, turn);
     cap(c, turn, velocity_cap);
     move(c, turn);
   }
@@ -145,23 +143,23 @@ struct RigidBodies<Real>::Impl {
     if (!std::isfinite(limit)) return;
     double fastest = 0;
     for (int k = 0; k < vertices; ++k)
-      fastest = std::max(
-          fastest,
-          mesh::norm(mesh::add(velocity_of_centre[c], cross(spin[c], mesh::transform(turn, shape.held[k])))));
+      fastest = std::max(fastest,
+                         mesh::norm(mesh::add(motion[c].velocity,
+                                              cross(motion[c].spin, mesh::transform(turn, shape.held[k])))));
     if (fastest <= limit) return;
-    velocity_of_centre[c] = mesh::scale(limit / fastest, velocity_of_centre[c]);
-    spin[c] = mesh::scale(limit / fastest, spin[c]);
+    motion[c].velocity = mesh::scale(limit / fastest, motion[c].velocity);
+    motion[c].spin = mesh::scale(limit / fastest, motion[c].spin);
   }
 
   void move(int c, const Matrix3& turn) {
-    const Turn step(mesh::scale(type.h, spin[c]));
+    const Turn step(mesh::scale(type.h, motion[c].spin));
     for (int k = 0; k < vertices; ++k) {
       const auto chord = step.chord(mesh::transform(turn, shape.held[k]));
       for (int d = 0; d < 3; ++d)
-        velocity[layout().at(c, k, d)] = static_cast<Real>(velocity_of_centre[c][d] + chord[d] / type.h);
+        velocity[layout().at(c, k, d)] = static_cast<Real>(motion[c].velocity[d] + chord[d] / type.h);
     }
-    set_anchor(c, mesh::add(anchor_of(c), mesh::scale(type.h, velocity_of_centre[c])));
-    orientation[c] = turned(step, orientation[c]);
+    set_anchor(c, mesh::add(anchor_of(c), mesh::scale(type.h, motion[c].velocity)));
+    motion[c].orientation = turned(step, motion[c].orientation);
     place(c);
   }
 };
@@ -213,8 +211,8 @@ int RigidBodies<Real>::add(std::int64_t id, const Vec3& centre, const Quaternion
   const int c = count();
   if (c >= impl_->capacity * lanes) impl_->reserve(std::max(c + 1, 2 * c));
   impl_->ids.push_back(id);
-  impl_->orientation[c] = mesh::normalized(q);
-  impl_->set_anchor(c, mesh::add(centre, mesh::rotate(impl_->orientation[c], impl_->shape.centre)));
+  impl_->motion[c].orientation = mesh::normalized(q);
+  impl_->set_anchor(c, mesh::add(centre, mesh::rotate(impl_->motion[c].orientation, impl_->shape.centre)));
   impl_->place(c);
   set_motion(c, {0, 0, 0}, {0, 0, 0});
   return c;
@@ -225,7 +223,7 @@ void RigidBodies<Real>::remove(int c) {
   const int last = count() - 1;
   if (c != last) {
     const auto put = [&](auto& list) { list[c] = list[last]; };
-    put(impl_->ids), put(impl_->orientation), put(impl_->velocity_of_centre), put(impl_->spin);
+    put(impl_->ids), put(impl_->motion);
     impl_->set_anchor(c, impl_->anchor_of(last));
     for (auto* field : {&impl_->offset, &impl_->held, &impl_->velocity, &impl_->normal, &impl_->predicted})
       for (int k = 0; k < vertices(); ++k)
@@ -275,7 +273,7 @@ StepReport RigidBodies<Real>::step(const StepOptions& options) {
   StepReport report;
   for (int c = 0; c < n && report.bad_cell < 0; ++c) {
     const auto x = impl_->anchor_of(c);
-    if (!std::isfinite(x[0] + x[1] + x[2] + mesh::norm(impl_->spin[c]))) report.bad_cell = c;
+    if (!std::isfinite(x[0] + x[1] + x[2] + mesh::norm(impl_->motion[c].spin))) report.bad_cell = c;
   }
   return report;
 }
@@ -286,7 +284,7 @@ Vec3 RigidBodies<Real>::anchor(int c) const {
 }
 template <class Real>
 Vec3 RigidBodies<Real>::position(int c, int k) const {
-  return mesh::add(anchor(c), mesh::rotate(impl_->orientation[c], impl_->shape.arm[k]));
+  return mesh::add(anchor(c), mesh::rotate(impl_->motion[c].orientation, impl_->shape.arm[k]));
 }
 template <class Real>
 std::vector<Vec3> RigidBodies<Real>::positions(int c) const {
@@ -316,9 +314,7 @@ void RigidBodies<Real>::save(int c, std::byte* out) const {
   };
   write(id(c));
   write(anchor(c));
-  write(impl_->orientation[c]);
-  write(impl_->velocity_of_centre[c]);
-  write(impl_->spin[c]);
+  write(impl_->motion[c]);
   for (int k = 0; k < vertices(); ++k)
     for (int d = 0; d < 3; ++d) write(impl_->velocity[layout().at(c, k, d)]);
 }
@@ -340,7 +336,8 @@ mesh::HostFields<Real> RigidBodies<Real>::host_fields() {
           impl_->normal.data(),
           impl_->predicted.data(),
           impl_->held.data(),
-          impl_->couple.empty() ? nullptr : impl_->couple.front().data()};
+          impl_->couple.empty() ? nullptr : impl_->couple.front().data(),
+          impl_->motion.data()};
 }
 
 template <class Real>
@@ -353,9 +350,7 @@ void RigidBodies<Real>::restore(int c, const std::byte* in) {
   read(impl_->ids[c]);
   read(anchor);
   impl_->set_anchor(c, anchor);
-  read(impl_->orientation[c]);
-  read(impl_->velocity_of_centre[c]);
-  read(impl_->spin[c]);
+  read(impl_->motion[c]);
   for (int k = 0; k < vertices(); ++k)
     for (int d = 0; d < 3; ++d) read(impl_->velocity[layout().at(c, k, d)]);
   impl_->place(c);
@@ -372,22 +367,22 @@ const BodyType& RigidBodies<Real>::type() const {
 
 template <class Real>
 Quaternion RigidBodies<Real>::orientation(int c) const {
-  return impl_->orientation[c];
+  return impl_->motion[c].orientation;
 }
 template <class Real>
 Vec3 RigidBodies<Real>::velocity(int c) const {
-  return impl_->velocity_of_centre[c];
+  return impl_->motion[c].velocity;
 }
 template <class Real>
 Vec3 RigidBodies<Real>::angular_velocity(int c) const {
-  return impl_->spin[c];
+  return impl_->motion[c].spin;
 }
 
 template <class Real>
 void RigidBodies<Real>::set_motion(int c, const Vec3& velocity, const Vec3& angular_velocity) {
-  impl_->velocity_of_centre[c] = velocity;
-  impl_->spin[c] = angular_velocity;
-  const auto turn = mesh::matrix(impl_->orientation[c]);
+  impl_->motion[c].velocity = velocity;
+  impl_->motion[c].spin = angular_velocity;
+  const auto turn = mesh::matrix(impl_->motion[c].orientation);
   for (int k = 0; k < vertices(); ++k) {
     const auto v = mesh::add(velocity, cross(angular_velocity, mesh::transform(turn, impl_->shape.held[k])));
     for (int d = 0; d < 3; ++d) {

@@ -40,6 +40,8 @@ class RigidBodies {
  public:
   static constexpr int lanes = mesh::lanes_of<Real>;
   explicit RigidBodies(BodyType type);
+  /// The same type, no bodies.
+  RigidBodies empty() const { return RigidBodies(type()); }
   ~RigidBodies();
   RigidBodies(RigidBodies&&) noexcept;
   RigidBodies& operator=(RigidBodies&&) noexcept;
@@ -83,7 +85,7 @@ class RigidBodies {
   void save(int c, std::byte* out) const;
   int load(const std::byte* in);
   void restore(int c, const std::byte* in);  ///< body c becomes the saved one
-  /// For who takes the step elsewhere and writes its outcome here (orientations come with restore()).
+  /// For who takes the step elsewhere and writes its outcome here.
   mesh::HostFields<Real> host_fields();
 
   // --- rigid bodies only -------------------------------------------------------------------------------

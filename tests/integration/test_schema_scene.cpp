@@ -121,8 +121,10 @@ time: {surface: 0.05 s}
 )";
   EXPECT_EQ(parse_scene(other, "t.yaml").source_text, parse_scene(blood, "s.yaml").source_text);
   EXPECT_EQ(hash(other), hash(blood));
-  // Checkpoints do not change results.
+  // Checkpoints do not change results, nor does it matter which device solves a cell.
   EXPECT_EQ(hash(blood, {"time.checkpoint.wall=5 min", "time.checkpoint.every=10 ms"}), hash(blood));
+  EXPECT_EQ(hash(blood, {"place.solid=device", "place.distribution=even"}),
+            hash(blood, {"place.solid=device"}));
 }
 
 TEST(SchemaScene, EveryKeyOfPhysicsChangesTheHash) {
@@ -188,7 +190,8 @@ TEST(SchemaScene, WritingAndReadingGivesTheSameScene) {
        "coupling.scheme=peskin", "coupling.force_cap=3 pN"},
       {"coupling.scheme=peskin", "coupling.force_cap=off", "coupling.retraction=0"},
       {"coupling.scheme=paper", "coupling.velocity_cap=0.07", "time.checkpoint.every=7 ms",
-       "seed=9007199254740993"}};
+       "seed=9007199254740993"},
+      {"place={solid: device, distribution: even}"}};
   for (const auto& overrides : variants) {
     const Scene s = parse_scene(blood, "s.yaml", overrides);
     EXPECT_EQ(write_scene(s), s.source_text);
@@ -221,6 +224,8 @@ TEST(SchemaScene, WordsMeanTheirEnumerators) {
   EXPECT_EQ(with("cells.kinds.rbc.bending.model=none").find_kind("rbc")->bending.model, Bending::Model::none);
   EXPECT_EQ(with("place.solid=device").place.solid, Place::device);
   EXPECT_EQ(with("place.fluid=host").place.fluid, Place::host);
+  EXPECT_EQ(with("place={solid: device, distribution: even}").place.distribution, Places::Distribution::even);
+  EXPECT_EQ(with("place.distribution=with_fluid").place.distribution, Places::Distribution::with_fluid);
   const auto rbc = [](const std::string& kind) {
     return *parse_scene(blood, "s.yaml", {"cells.kinds.rbc=" + kind}).find_kind("rbc");
   };
@@ -312,6 +317,21 @@ TEST(SchemaScene, ConditionsBetweenKeys) {
   EXPECT_TRUE(contains(errors_of(blood, {"time.sample=0.1 us"}), "below the time step of 1.25e-07 s"));
   EXPECT_TRUE(
       contains(errors_of(blood, {"time.sample=1 us", "acceleration=16"}), "below the time step of 2e-06 s"));
+}
+
+TEST(SchemaScene, EvenDistributionWantsTheSolidAloneOnDevices) {
+  const auto errors = [](const std::string& place) {
+    return errors_of("format: hemowalk.scene/1\nplace: " + place + "\n", {});
+  };
+  const std::string why =
+      ": place.distribution: even without the solid alone on devices (elsewhere cells are";
+  EXPECT_TRUE(contains(errors("{distribution: even}"), ":2:23" + why)) << errors("{distribution: even}");
+  EXPECT_TRUE(contains(errors("{fluid: device, coupling: device, solid: device, distribution: even}"),
+                       ":2:71" + why));
+  EXPECT_TRUE(contains(errors("{fluid: device, solid: device, distribution: even}"), why));
+  EXPECT_TRUE(contains(errors("{coupling: device, solid: device, distribution: even}"), why));
+  EXPECT_EQ(errors("{solid: device, distribution: even}"), "");
+  EXPECT_EQ(errors("{distribution: with_fluid}"), "");
 }
 
 TEST(SchemaScene, Ranges) {

@@ -260,9 +260,11 @@ TEST_P(DeviceSimulationTest, HybridFollowsTheHost) {
   Simulation<double> host(scene, small_crowd());
   scene.place.solid = Place::device;
   Simulation<double> hybrid(scene, small_crowd());
+  EnergyBudget budget, other;
   {
     Stepper<double> stepper(hybrid, GetParam());
-    for (int i = 0; i < 100; ++i) host.step(), stepper.step();
+    for (int i = 0; i < 99; ++i) host.step(), stepper.step();
+    host.step(&budget), stepper.step(&other);
     EXPECT_EQ(stepper.fluid_steps(), 100);
     stepper.sync();
   }
@@ -274,6 +276,11 @@ TEST_P(DeviceSimulationTest, HybridFollowsTheHost) {
   const auto& a = std::get<rigid::RigidBodies<double>>(host.groups()[1].cells);
   const auto& b = std::get<rigid::RigidBodies<double>>(hybrid.groups()[1].cells);
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(a.orientation(0)[i], b.orientation(0)[i], 1e-10);
+  const auto at = [](const EnergyBudget& b, int i) { return (&b.walls)[i]; };
+  for (int i = 0; i < static_cast<int>(sizeof budget / sizeof(double)); ++i)
+    EXPECT_NEAR(at(budget, i), at(other, i), 1e-9 * budget.viscous)
+        << "term " << i << " of the energy budget";
+  EXPECT_GT(std::abs(budget.contact), 1e-6 * budget.viscous);
   hybrid.step();  // on the host again
 }
 
