@@ -1,6 +1,7 @@
 #include "resolved/device_solid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace hemowalk::resolved {
@@ -99,7 +100,8 @@ void DeviceSolid<Real>::Share::cut(int number) {
   const Place place = queue.place();
   const std::size_t n = host.batches * host.batch_size();
   parts.clear(), pinned.clear();
-  for (const Real* field : {host.predicted, host.offset, host.velocity, host.normal, host.held})
+  const std::array<const Real*, 5> fields{host.predicted, host.offset, host.velocity, host.normal, host.held};
+  for (const Real* field : fields)
     if (field) pinned.emplace_back(place, field, n * sizeof(Real));
   pinned.emplace_back(place, host.anchor, 3 * mesh::lanes_of<Real> * host.batches * sizeof(double));
   if (host.motion) pinned.emplace_back(place, host.motion, group.count() * sizeof(rigid::BodyMotion));
