@@ -184,6 +184,21 @@ inline double drift_alone(double acceleration, double offset, double kappa = 0.5
   return 0.5 * (observe(sim, 0, 0).centre[1] - start);
 }
 
+/// What is left of the displacements \p imposed on the vertices of a cell at \p rest: their projection.
+inline double share_left(const std::vector<mesh::Vec3>& now, const std::vector<mesh::Vec3>& rest,
+                         const std::vector<mesh::Vec3>& imposed) {
+  mesh::Vec3 centre{};
+  for (const auto& p : now)
+    for (int d = 0; d < 3; ++d) centre[d] += p[d] / static_cast<double>(now.size());
+  double sum = 0, square = 0;
+  for (std::size_t k = 0; k < now.size(); ++k)
+    for (int d = 0; d < 3; ++d) {
+      const double u = imposed[k][d];
+      sum += (now[k][d] - centre[d] - rest[k][d]) * u, square += u * u;
+    }
+  return sum / square;
+}
+
 /// How a red cell lying any way comes back, s: stretched by \p strain along its own x axis and released in
 /// fluid at rest; time constant of the displacement imposed from 80 to 40 % of it (the program's t_c is the
 /// 1/e time of the length, below). Lattice of \p nodes a side; looks \p every so many steps.
@@ -202,26 +217,36 @@ inline double return_time(double kappa, double acceleration, const mesh::Quatern
   }
   resolved::Simulation<float> sim(scene, {{0, {middle, middle, middle}, orientation, x}});
   const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
-  // Projection on the displacement that was imposed.
-  const auto excess = [&] {
-    const auto now = cells.positions(0);
-    mesh::Vec3 centre{};
-    for (const auto& p : now)
-      for (int d = 0; d < 3; ++d) centre[d] += p[d] / static_cast<double>(now.size());
-    double sum = 0, square = 0;
-    for (std::size_t k = 0; k < now.size(); ++k)
-      for (int d = 0; d < 3; ++d) {
-        const double u = imposed[k][d];
-        sum += (now[k][d] - centre[d] - rest[k][d]) * u, square += u * u;
-      }
-    return sum / square;
-  };
   double early = 0;
   while (sim.time() < 2) {
     for (int i = 0; i < every; ++i) sim.step();
-    const double left = excess();
+    const double left = share_left(cells.positions(0), rest, imposed);
     if (early == 0 && left < 0.8) early = sim.time();
     if (left < 0.4) return (sim.time() - early) / std::log(2.0);
+  }
+  return std::nan("");
+}
+
+/// The same time (kappa 0) in unbounded Stokes flow by the boundary integral, s.
+inline double return_time_in_stokes_flow(double strain = 0.1, int subdivision = 8) {
+  const auto mesh_at_rest = mesh::red_cell(1, subdivision);
+  const npfem::CellType type(mesh_at_rest, npfem::Material{},
+                             std::vector<double>(mesh_at_rest.vertices.size(), 1.0), 1);
+  const BoundaryIntegral fluid(mesh_at_rest, 1.025e-3);  // Pa s = pN s/um2
+  const auto& rest = mesh_at_rest.vertices;
+  auto x = rest, imposed = rest;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    imposed[k] = {rest[k][0] * strain, 0, rest[k][2] / (1 + strain) - rest[k][2]};
+    x[k] = mesh::add(rest[k], imposed[k]);
+  }
+  constexpr double dt = 1e-6;
+  double early = 0;
+  for (int i = 1; i * dt < 0.1; ++i) {
+    advance_in_stokes_flow(
+        type, fluid, dt, [](const mesh::Vec3&) { return mesh::Vec3{}; }, x);
+    const double left = share_left(x, rest, imposed);
+    if (early == 0 && left < 0.8) early = i * dt;
+    if (left < 0.4) return (i * dt - early) / std::log(2.0);
   }
   return std::nan("");
 }

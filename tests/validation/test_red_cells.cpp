@@ -148,6 +148,19 @@ TEST(RedCell, TreadsAsTheBoundaryIntegral) {
   EXPECT_LT(std::abs(error.back()), std::abs(error.front())) << "does not converge";
 }
 
+// How fast a stretched cell comes back, kappa 0, against the boundary integral: images slow it down by
+// (radius/box)^3, which two boxes take off.
+TEST(RedCell, RecoversAsTheBoundaryIntegral) {
+  const double exact = test::return_time_in_stokes_flow();
+  const double narrow = test::return_time(0, 50, mesh::identity_rotation, 40, 2),
+               wide = test::return_time(0, 50, mesh::identity_rotation, 72, 2),
+               alone = wide - (narrow - wide) / (std::pow(72.0 / 40, 3) - 1);
+  std::printf(
+      "recovery time, kappa 0: exact %.3f ms; boxes of 20 and 36 um %.3f, %.3f, alone %.3f (%+.1f %%)\n",
+      1e3 * exact, 1e3 * narrow, 1e3 * wide, 1e3 * alone, 100 * (alone / exact - 1));
+  EXPECT_NEAR(alone / exact, 1, 0.15);
+}
+
 // A disc's periodic images act on it differently along an edge and along a diagonal of the box, by
 // (radius/box)^3; taken off by two boxes, what remains is the lattice's.
 TEST(RedCell, DragDoesNotKnowTheLattice) {
