@@ -25,7 +25,14 @@ struct Lanes<1> {
 /// The same bits as another type of equal size.
 template <class To, class From>
 HEMO_HD HEMO_INLINE To same_bits(const From& from) {
-  return __builtin_bit_cast(To, from);
+  if constexpr (std::is_trivially_copyable_v<To> && std::is_trivially_copyable_v<From>) {
+    return __builtin_bit_cast(To, from);
+  } else {  // packs that are wider than the machine's registers
+    static_assert(sizeof(To) == sizeof(From));
+    To to;
+    __builtin_memcpy(static_cast<void*>(&to), static_cast<const void*>(&from), sizeof(To));
+    return to;
+  }
 }
 
 HEMO_HD HEMO_INLINE float select(bool flag, float a, float b) { return flag ? a : b; }
