@@ -78,11 +78,11 @@ data::Scene soft_scene() {
 template <class Sim>
 void use_springs(Sim& sim, double stiffness) {
   auto& cells = std::get<npfem::Membranes<double>>(sim.groups()[0].cells);
-  sim.set_solid({[&cells, springs = SpringMembrane(cells.type(), stiffness)](const mesh::StepOptions&) {
-                   return std::vector<mesh::StepReport>{springs.step(cells)};
-                 },
-                 {},
-                 {}});
+  typename Sim::SolidElsewhere solid;
+  solid.step = [&cells, springs = SpringMembrane(cells.type(), stiffness)](const mesh::StepOptions&) {
+    return std::vector<mesh::StepReport>{springs.step(cells)};
+  };
+  sim.set_solid(std::move(solid));
 }
 
 // With the lattice's plasma: momentum closes to round-off, and softer springs give way more. Above the
