@@ -170,5 +170,32 @@ TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
   }
 }
 
+// Without retraction a deformable platelet is too thick on every lattice, by a thickness t on all sides that
+// falls with order 2 and more: the spheroid of its period has the half axes 1.8 um + t and 0.55 um + t.
+TEST(HydrodynamicThickness, DeformablePlateletWithoutRetraction) {
+  data::Kind paper;
+  paper.bending.modulus = 100e-18;
+  std::vector<double> thickness;
+  std::printf(
+      "dx/um | period gamma, effective thickness/um: paper's law, bending 100 pN um, no retraction\n");
+  for (const auto& [dx, n] : {std::pair{0.5, 4}, {1.0 / 3, 6}, {0.25, 8}}) {
+    BodyCase c;
+    c.shape = test::platelet_shape(), c.dx = dx, c.subdivision = n, c.coupling.retraction = 0;
+    c.acceleration = dx < 0.3 ? 100 : 50;
+    const double period = orbit(c, paper), sum = period / (2 * M_PI),
+                 aspect = sum / 2 + std::sqrt(sum * sum / 4 - 1);
+    thickness.push_back((platelet_radii[0] - aspect * platelet_radii[1]) / (aspect - 1));
+    std::printf("%.3f | %.2f %.4f\n", dx, period, thickness.back());
+    std::fflush(stdout);
+  }
+  for (const int i : {0, 1}) EXPECT_LT(thickness[i + 1], thickness[i]);
+  EXPECT_GT(std::log(thickness[0] / thickness[2]) / std::log(2), 1.5) << "order in dx";
+  const double t = thickness[2] - (thickness[1] - thickness[2]) / (std::pow(4.0 / 3, 2) - 1);
+  const double limit = test::exact_jeffery_period((platelet_radii[0] + t) / (platelet_radii[1] + t));
+  std::printf("limit by order 2 in the thickness: %.4f um, period gamma %.2f (%+.1f %%)\n", t, limit,
+              100 * (limit / exact_period - 1));
+  EXPECT_NEAR(limit / exact_period, 1, 0.03);
+}
+
 }  // namespace
 }  // namespace hemowalk::resolved
