@@ -4,7 +4,8 @@
 usage: tools/suspension_table.py [--from MS] [--to MS] [--lag MS] RUN...
 
 Times in ms. Core: the middle 40 % of the gap. Square displacements across the stream (y) are over all cells and
-all origins of the window, um2, +- the standard error over cells. Stress, velocity and hematocrit are means over the window.
+all origins of the window, um2, +- the standard error over cells. Stress, velocity and hematocrit are means over the window;
+mu is that of the default plasma.
 """
 import argparse
 import os
