@@ -8,4 +8,4 @@ hemowalk_test(test_calibration_synthetic SOURCES unit/test_calibration_synthetic
 hemowalk_test(test_calibration_published SOURCES verification/test_calibration_published.cpp LINK hemowalk_calibration
               LABELS verification)
 hemowalk_test(test_calibration_coverage SOURCES validation/test_calibration_coverage.cpp LINK hemowalk_calibration
-              LABELS validation TIMEOUT 3600)
+              LABELS validation TIMEOUT 3600 EACH)

@@ -17,4 +17,4 @@ if(benchmark_FOUND)
   target_link_libraries(bench_npfem PRIVATE hemowalk_npfem hemowalk_rigid benchmark::benchmark)
 endif()
 
-hemowalk_test(validate_solid SOURCES validation/test_solid_experiments.cpp LINK hemowalk_npfem LABELS validation TIMEOUT 1200)
+hemowalk_test(validate_solid SOURCES validation/test_solid_experiments.cpp LINK hemowalk_npfem LABELS validation TIMEOUT 1200 EACH)
