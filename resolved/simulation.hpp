@@ -129,6 +129,7 @@ class Simulation {
     std::function<void()> restart;  ///< a state was loaded (all)
   };
   void set_solid(SolidElsewhere solid) { solid_ = std::move(solid); }
+  bool solid_is_elsewhere() const { return static_cast<bool>(solid_.step); }
   /// The cells whose solid step this rank takes.
   const std::vector<Group<Real>>& moved() const { return solid_.moved ? *solid_.moved : groups_; }
   /// Who advances the fluid instead of the lattice Boltzmann fluid: writes the velocity that markers read,

@@ -31,6 +31,8 @@ Stepper<Real>::Stepper(Simulation<Real>& simulation, Place device) {
   const auto& place = simulation.scene().place;
   const std::string problem = place_problem(simulation.scene());
   require(problem.empty(), problem);
+  require(!simulation.solid_is_elsewhere(),
+          "two Steppers of one simulation (each moves its cells) destroy the first before making another");
   const bool any = place.solid == Place::device;
   impl_ = std::make_unique<Impl>(simulation, any ? device : Place::host);
   if (!any) return;

@@ -339,6 +339,18 @@ TEST(Stepper, RefusesPlacesThatDoNotGoTogether) {
   EXPECT_THROW(Stepper<float>(sim, Place::host), InputError);
 }
 
+TEST(Stepper, IsTheOnlyOneOfItsSimulation) {
+  data::Scene scene = small_scene();
+  scene.place.solid = Place::device;
+  Simulation<float> sim(scene, small_crowd());
+  {
+    Stepper<float> first(sim, Place::host);
+    EXPECT_THROW(Stepper<float>(sim, Place::host), InputError);
+    EXPECT_TRUE(sim.solid_is_elsewhere());
+  }
+  EXPECT_NO_THROW(Stepper<float>(sim, Place::host));
+}
+
 TEST(Stepper, AsksForAGpu) {
   if (device_present()) GTEST_SKIP() << "there is a device";
   data::Scene scene = small_scene();
