@@ -23,7 +23,7 @@ if(TARGET hemowalk_resolved)
   target_include_directories(bench_ranks PRIVATE ${CMAKE_SOURCE_DIR}/tests)
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
-            validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp
+            validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp validation/test_default_coupling.cpp
     LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH
     FIRST Vessel.PriesAt40um Vessel.PriesAt20umAnd15PerCent Vessel.PriesAt20umAnd30PerCent Suspension.TopAndBottomOverPackings)
   hemowalk_test(validate_rheology SOURCES validation/test_rheology.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH)

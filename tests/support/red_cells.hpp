@@ -54,62 +54,77 @@ inline mesh::Observables observe(const resolved::Simulation<float>& sim, int gro
 }
 
 struct Shear {
-  double deformation = 0, inclination = 0;  ///< means over the second half of the run
+  double strain = 0;                        ///< over which all of the following are taken
+  double deformation = 0, inclination = 0;  ///< means
   double marker_turn = 0;                   ///< |angle| the material marker went round the centre, rad
   double axis_turn = 0;                     ///< |angle| the material's axis turned in the shear plane, rad
   double shape_turn = 0;                    ///< |angle| the shape's long axis turned there, rad: tumbling
   double volume = 1;                        ///< at the end over the start
-  mesh::Vec3 centre{};                      ///< at the end, dx
+
+  double marker_frequency() const { return marker_turn / (2 * M_PI * strain); }  ///< over the shear rate
+  double shape_frequency() const { return shape_turn / (2 * M_PI * strain); }    ///< over the shear rate
 };
 
-/// Follows a cell through a shear flow; turns count from the strain \p from on, means over the second half of
-/// \p strain.
+/// Follows a cell through a shear flow from the strain \p from on: until the marker has gone half way round
+/// and the cell, symmetric as it is, looks as it did (it hurries and lingers in between, so that no other
+/// interval gives its frequency), or to the strain \p until.
 class ShearRecord {
  public:
-  ShearRecord(const mesh::Observables& start, double from, double strain)
-      : last_(start), volume_(start.volume), from_(from), strain_(strain) {}
+  ShearRecord(const mesh::Observables& start, double from, double until)
+      : last_(start), volume_(start.volume), from_(from), until_(until) {}
 
   void add(double strain, const mesh::Observables& o) {
     const auto axis = [](const mesh::Observables& at) { return std::atan2(at.axis[1], at.axis[2]); };
-    if (strain > from_) {
-      turned_ += std::remainder(o.tank_treading_angle - last_.tank_treading_angle, 2 * M_PI);
-      tumbled_ += std::remainder(axis(o) - axis(last_), 2 * M_PI);
-      leant_ += std::remainder(o.inclination - last_.inclination, M_PI);
-    }
-    if (2 * strain > strain_)
+    if (strain > from_ && !done()) {
+      const double turn = std::remainder(o.tank_treading_angle - last_.tank_treading_angle, 2 * M_PI),
+                   left = M_PI - std::abs(turned_),
+                   share = std::min(1.0, left / std::max(std::abs(turn), 1e-9));
+      turned_ += share * turn;
+      tumbled_ += share * std::remainder(axis(o) - axis(last_), 2 * M_PI);
+      leant_ += share * std::remainder(o.inclination - last_.inclination, M_PI);
       deformation_ += o.taylor_deformation, inclination_ += o.inclination, samples_ += 1;
-    last_ = o;
+      end_ = strain - (1 - share) * (strain - before_);
+    }
+    last_ = o, before_ = strain;
   }
+  /// Nothing more will be counted.
+  bool done() const { return before_ >= until_ || std::abs(turned_) > (1 - 1e-9) * M_PI; }
   Shear result() const {
-    return {deformation_ / samples_, inclination_ / samples_, std::abs(turned_), std::abs(tumbled_),
-            std::abs(leant_),        last_.volume / volume_,  last_.centre};
+    return {end_ - from_,       deformation_ / samples_, inclination_ / samples_, std::abs(turned_),
+            std::abs(tumbled_), std::abs(leant_),        last_.volume / volume_};
   }
 
  private:
   mesh::Observables last_;
-  double volume_, from_, strain_;
-  double turned_ = 0, tumbled_ = 0, leant_ = 0, deformation_ = 0, inclination_ = 0, samples_ = 0;
+  double volume_, from_, until_;
+  double before_ = 0, end_ = 0, turned_ = 0, tumbled_ = 0, leant_ = 0, deformation_ = 0, inclination_ = 0,
+         samples_ = 0;
 };
 constexpr double between_looks = 0.025;  ///< strain
 
-/// One red cell, its axis turned by \p angle out of the gradient direction, for a strain of \p strain; turns
-/// count from the strain \p from on.
-inline Shear red_cell_in_shear(double acceleration, double kappa, double strain, const mesh::Vec3& shift,
-                               double angle = 0.5, double shear_rate = 100, double from = 0,
-                               const data::Coupling& coupling = {}, double dx = 0.5) {
-  auto kind = red_cell_kind(kappa);
-  kind.subdivision = static_cast<int>(std::lround(4 / dx));
-  auto scene = shear_scene({14, 16, 14}, acceleration, {kind});
-  scene.fluid.dx = 1e-6 * dx;
-  scene.flow.shear_rate = shear_rate, scene.coupling = coupling;
-  resolved::Simulation<float> sim(
-      scene,
-      {{0, {7 / dx + shift[0], 8 / dx + shift[1], 7 / dx + shift[2]}, mesh::rotation({1, 0, 0}, angle), {}}});
-  const double rate = sim.units().rate(shear_rate);
-  const int steps = static_cast<int>(strain / rate),
-            every = std::max(1, static_cast<int>(between_looks / rate));
-  ShearRecord record(observe(sim, 0, 0), from, strain);
-  for (int i = 1; i <= steps; ++i) {
+/// One red cell, its axis turned by \p angle out of the gradient direction; what ShearRecord sees.
+struct ShearCase {
+  double kappa = 0, angle = 0.5, shear_rate = 100, acceleration = 50;
+  double from = 10, until = 60;  ///< strains
+  mesh::Vec3 shift{};            ///< from the middle of the box, dx
+  data::Coupling coupling;
+  double dx = 0.5;             ///< um
+  data::Vec3 box{14, 16, 14};  ///< um
+};
+
+inline Shear red_cell_in_shear(const ShearCase& c) {
+  auto kind = red_cell_kind(c.kappa);
+  kind.subdivision = static_cast<int>(std::lround(4 / c.dx));
+  auto scene = shear_scene(c.box, c.acceleration, {kind});
+  scene.fluid.dx = 1e-6 * c.dx;
+  scene.flow.shear_rate = c.shear_rate, scene.coupling = c.coupling;
+  mesh::Vec3 middle{};
+  for (int d = 0; d < 3; ++d) middle[d] = c.box[d] / 2 / c.dx + c.shift[d];
+  resolved::Simulation<float> sim(scene, {{0, middle, mesh::rotation({1, 0, 0}, c.angle), {}}});
+  const double rate = sim.units().rate(c.shear_rate);
+  const int every = std::max(1, static_cast<int>(between_looks / rate));
+  ShearRecord record(observe(sim, 0, 0), c.from, c.until);
+  for (int i = 1; !record.done(); ++i) {
     sim.step();
     if (i % every == 0) record.add(i * rate, observe(sim, 0, 0));
   }
@@ -117,25 +132,24 @@ inline Shear red_cell_in_shear(double acceleration, double kappa, double strain,
 }
 
 /// The same cell (kappa 0) by the boundary integral: unbounded plasma, no inertia. The area modulus of the
-/// paper's law allows strains of 0.001 per step at 1000 1/s.
-inline Shear red_cell_in_stokes_flow(double strain, double angle, double shear_rate, double from,
-                                     int subdivision = 8) {
+/// paper's law allows time steps of 1 us with 258 vertices.
+inline Shear red_cell_in_stokes_flow(const ShearCase& c, int subdivision = 8) {
   const auto rest = mesh::red_cell(1, subdivision);
   const npfem::CellType type(rest, npfem::Material{}, std::vector<double>(rest.vertices.size(), 1.0), 1);
   const BoundaryIntegral fluid(rest, 1.025e-3);  // Pa s = pN s/um2
   auto x = rest.vertices;
-  for (auto& p : x) p = mesh::rotate(mesh::rotation({1, 0, 0}, angle), p);
-  ShearRecord record(mesh::observe(rest, x, type.marker()), from, strain);
-  const int every = std::max(1, static_cast<int>(25000 / shear_rate));
-  const double dt = between_looks / every / shear_rate;
-  for (int i = 1; i * dt * shear_rate < strain; ++i) {
+  for (auto& p : x) p = mesh::rotate(mesh::rotation({1, 0, 0}, c.angle), p);
+  ShearRecord record(mesh::observe(rest, x, type.marker()), c.from, c.until);
+  const int every = std::max(1, static_cast<int>(25000 / c.shear_rate));
+  const double dt = between_looks / every / c.shear_rate;
+  for (int i = 1; !record.done(); ++i) {
     advance_in_stokes_flow(
         type, fluid, dt,
         [&](const mesh::Vec3& p) {
-          return mesh::Vec3{0, 0, shear_rate * p[1]};
+          return mesh::Vec3{0, 0, c.shear_rate * p[1]};
         },
         x);
-    if (i % every == 0) record.add(i * dt * shear_rate, mesh::observe(rest, x, type.marker()));
+    if (i % every == 0) record.add(i * dt * c.shear_rate, mesh::observe(rest, x, type.marker()));
   }
   return record.result();
 }
@@ -203,10 +217,11 @@ inline double share_left(const std::vector<mesh::Vec3>& now, const std::vector<m
 /// fluid at rest; time constant of the displacement imposed from 80 to 40 % of it (the program's t_c is the
 /// 1/e time of the length, below). Lattice of \p nodes a side; looks \p every so many steps.
 inline double return_time(double kappa, double acceleration, const mesh::Quaternion& orientation, int nodes,
-                          int every, double strain = 0.1) {
+                          int every, double strain = 0.1, const data::Coupling& coupling = {}) {
   const double box = nodes / 2, middle = nodes / 2.0;
   auto scene = shear_scene({box, box, box}, acceleration, {red_cell_kind(kappa)});
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
+  scene.coupling = coupling;
   auto rest = resolved::make_mesh(scene.cells.kinds[0], scene.fluid.dx).vertices;
   auto x = rest, imposed = rest;
   for (std::size_t k = 0; k < x.size(); ++k) {
@@ -270,13 +285,9 @@ inline double settled_speed(const data::Kind& kind, double box, const mesh::Vec3
   const double n = sim.block().nx;
   for (int i = 0; i < settling_steps(n); ++i) sim.step();
   const resolved::Momentum m = sim.momentum();
-  const auto& cells = std::get<npfem::Membranes<double>>(sim.groups()[0].cells);
   double speed = 0;
-  for (int d = 0; d < 3; ++d) {
-    double mean = 0;
-    for (int k = 0; k < cells.vertices(); ++k) mean += cells.velocities()[cells.layout().at(0, k, d)];
-    speed += along[d] * (mean / cells.vertices() - (m.fluid[d] + m.cells[d]) / (n * n * n));
-  }
+  for (int d = 0; d < 3; ++d)
+    speed += along[d] * (mean_velocity(sim, d) - (m.fluid[d] + m.cells[d]) / (n * n * n));
   return speed * sim.fluid().viscosity() / sim.units().force(pull);
 }
 

@@ -62,7 +62,8 @@ void expect_sound(const std::vector<SuspensionResult>& runs) {
 TEST(Rheology, ViscosityOverHematocrit) {
   std::printf("| Ht | wide tube at the core's Ht |%s\n", columns);
   double before = 1;
-  std::vector<double> nominal, inside, gap, gap_error, core_value, core_error, smooth, law;
+  std::vector<double> nominal, inside, gap, gap_error, core_value, core_error, smooth, law, layer,
+      layer_error;
   for (double h = 0; h < 0.501; h += 0.02) smooth.push_back(h), law.push_back(wide_tube_viscosity(h));
   for (const double hematocrit : {0.1, 0.2, 0.3, 0.45}) {
     SuspensionCase c;
@@ -83,6 +84,8 @@ TEST(Rheology, ViscosityOverHematocrit) {
     gap.push_back(viscosity);
     gap_error.push_back(finite(test::mean_of(runs, &SuspensionResult::viscosity).error));
     core_value.push_back(middle.value), core_error.push_back(finite(middle.error));
+    const auto plasma = test::mean_of(runs, &SuspensionResult::plasma_layer);
+    layer.push_back(plasma.value), layer_error.push_back(finite(plasma.error));
   }
   using Style = test::Figure::Style;
   test::Figure("viscosity_over_hematocrit", "Red cells between walls 20 µm apart", "hematocrit",
@@ -90,6 +93,10 @@ TEST(Rheology, ViscosityOverHematocrit) {
       .curve("whole gap", Style::points, 0, nominal, gap, gap_error)
       .curve("core, at its own hematocrit and shear rate", Style::points, 1, inside, core_value, core_error)
       .curve("wide tube, Pries et al. 1992", Style::line, -1, smooth, law)
+      .write();
+  test::Figure("plasma_layer", "Red cells between walls 20 µm apart", "hematocrit", "plasma layer, µm")
+      .with("set yrange [0:]")
+      .curve("hematocrit below half the core's", Style::points, 0, nominal, layer, layer_error)
       .write();
 }
 
@@ -107,13 +114,22 @@ TEST(Rheology, ViscosityOverShearRate) {
     expect_sound(runs);
     return test::mean_of(runs, &SuspensionResult::viscosity).value;
   };
-  double before = 1e9;
-  for (const double rate : {20.0, 100.0, 500.0}) {
-    const double viscosity = run(rate, 0.5);
-    EXPECT_LT(viscosity, before);
-    before = viscosity;
+  const std::vector<double> rates{20, 100, 500};
+  std::vector<double> viscosity;
+  for (const double rate : rates) {
+    viscosity.push_back(run(rate, 0.5));
+    if (viscosity.size() > 1) {
+      EXPECT_LT(viscosity.back(), viscosity[viscosity.size() - 2]);
+    }
   }
-  run(100, 0.9);
+  const double damped = run(100, 0.9);
+  using Style = test::Figure::Style;
+  test::Figure("viscosity_over_shear_rate", "Red cells at 35 % between walls 15 µm apart", "shear rate, 1/s",
+               "viscosity over that of plasma")
+      .with("set logscale x\nset xrange [10:1000]\nset yrange [1:]")
+      .curve("κ 0.5", Style::dots, 0, rates, viscosity)
+      .curve("κ 0.9", Style::points, 1, {100}, {damped})
+      .write();
 }
 
 // The same packing on three lattices, and on the coarsest with the meshes of the finer ones: a box of 12 um,
@@ -143,6 +159,16 @@ TEST(Rheology, ViscosityAndPowerOverLatticeSpacing) {
   };
   for (const auto& [dx, subdivision] : {std::pair{0.5, 8}, {1.0 / 3, 12}, {0.25, 16}})
     runs.push_back(run(dx, subdivision));
+  using Style = test::Figure::Style;
+  test::Figure("viscosity_over_dx", "Red cells at 35 % between walls 12 µm apart, one packing",
+               "lattice spacing, µm", "over that of plasma at the nominal shear rate")
+      .with("set xrange [0:0.55]\nset yrange [0:]")
+      .curve("stress", Style::dots, 0, {0.5, 1.0 / 3, 0.25},
+             {runs[0].viscosity, runs[1].viscosity, runs[2].viscosity})
+      .curve("of it slip and modes without stress", Style::dots, 1, {0.5, 1.0 / 3, 0.25},
+             {runs[0].power.numerical() * runs[0].viscosity, runs[1].power.numerical() * runs[1].viscosity,
+              runs[2].power.numerical() * runs[2].viscosity})
+      .write();
   // Known: the coupling acts too thick on a coarse lattice, 12 % at 0.5 um against 0.25 um.
   EXPECT_NEAR(runs[0].viscosity / runs[2].viscosity, 1, 0.2);
   EXPECT_NEAR(runs[1].viscosity / runs[2].viscosity, 1, 0.06);
