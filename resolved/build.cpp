@@ -7,6 +7,7 @@
 #include "core/check.hpp"
 #include "resolved/mesh/mesh_file.hpp"
 #include "resolved/mesh/shapes.hpp"
+#include "resolved/mesh/vector.hpp"
 
 namespace hemowalk::resolved {
 
@@ -133,32 +134,58 @@ constexpr PlateletFit with_phi4{
 constexpr PlateletFit with_phi3{
     1.714, {{{0.917, 1.914}, {1.1, 2.151}, {1.375, 2.191}, {1.65, 1.857}, {1.833, 1.557}, {2.2, 1.18}}}};
 
+/// By which shares of its semi-axes (y: of the faces, x and z: of the rim) a platelet is drawn back.
+mesh::Vec3 platelet_shares(const data::Kind& kind, const mesh::TriangleMesh& rest,
+                           const data::Coupling& coupling) {
+  mesh::Vec3 radius{};
+  for (const auto& p : rest.vertices)
+    for (int d = 0; d < 3; ++d) radius[d] = std::max(radius[d], p[d]);
+  const PlateletFit& fit = coupling.kernel == data::Coupling::Kernel::phi4 ? with_phi4 : with_phi3;
+  const double rim = fit.rim * coupling.retraction, face = fit.face(radius[1]) * coupling.retraction;
+  const mesh::Vec3 depth{rim, face, rim};
+  for (int d = 0; d < 3; ++d)
+    require(depth[d] < radius[d], [&] {
+      return "cells.kinds." + kind.name + " is too thin for coupling.retraction (its half thickness of " +
+             std::to_string(radius[d]) + " dx would be drawn back by " + std::to_string(depth[d]) +
+             " dx) lower fluid.dx or the retraction";
+    });
+  return {depth[0] / radius[0], depth[1] / radius[1], depth[2] / radius[2]};
+}
+
 }  // namespace
 
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
                                         const data::Coupling& coupling) {
-  const double retraction = coupling.retraction;
   std::vector<mesh::Vec3> points = rest.vertices;
   if (kind.shape.type == data::Shape::Type::platelet) {
-    mesh::Vec3 radius{};
-    for (const auto& p : points)
-      for (int d = 0; d < 3; ++d) radius[d] = std::max(radius[d], p[d]);
-    const PlateletFit& fit = coupling.kernel == data::Coupling::Kernel::phi4 ? with_phi4 : with_phi3;
-    const mesh::Vec3 depth{fit.rim * retraction, fit.face(radius[1]) * retraction, fit.rim * retraction};
-    for (int d = 0; d < 3; ++d)
-      require(depth[d] < radius[d], [&] {
-        return "cells.kinds." + kind.name + " is too thin for coupling.retraction (its half thickness of " +
-               std::to_string(radius[d]) + " dx would be drawn back by " + std::to_string(depth[d]) +
-               " dx) lower fluid.dx or the retraction";
-      });
+    const mesh::Vec3 share = platelet_shares(kind, rest, coupling);
     for (auto& p : points)
-      for (int d = 0; d < 3; ++d) p[d] *= 1 - depth[d] / radius[d];
+      for (int d = 0; d < 3; ++d) p[d] *= 1 - share[d];
     return points;
   }
   const auto normals = mesh::vertex_normals(rest);
   for (std::size_t k = 0; k < points.size(); ++k)
-    for (int d = 0; d < 3; ++d) points[k][d] -= retraction * normals[k][d];
+    for (int d = 0; d < 3; ++d) points[k][d] -= coupling.retraction * normals[k][d];
   return points;
+}
+
+MirrorSurface mirror_surface(const data::Kind& kind, const mesh::TriangleMesh& rest,
+                             const data::Coupling& coupling) {
+  if (kind.shape.type != data::Shape::Type::platelet || kind.law == data::Kind::Law::rigid ||
+      coupling.retraction == 0)
+    return {};
+  const mesh::Vec3 share = platelet_shares(kind, rest, coupling);
+  MirrorSurface surface{{}, share[1], share[0]};
+  const auto& x = rest.vertices;
+  for (const auto& p : x) {
+    const mesh::Vec3 image{p[0], -p[1], p[2]};
+    const auto distance = [&](const mesh::Vec3& q) { return mesh::norm(mesh::subtract(q, image)); };
+    const auto nearest = std::min_element(
+        x.begin(), x.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+    require(distance(*nearest) < 1e-6, "the mesh of a platelet has no mirror plane");
+    surface.mirror.push_back(static_cast<int>(nearest - x.begin()));
+  }
+  return surface;
 }
 
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units) {

@@ -11,6 +11,7 @@
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/mesh/mesh.hpp"
 #include "resolved/npfem/material.hpp"
+#include "resolved/retraction.hpp"
 #include "resolved/units.hpp"
 
 namespace hemowalk::resolved {
@@ -27,11 +28,15 @@ lbm::Parameters make_fluid(const data::Scene& scene, const LatticeUnits& units);
 double steady_velocity(const data::Scene& scene, const LatticeUnits& units, double x, double y);
 /// Rest shape centred at the origin, in units of \p unit metres.
 mesh::TriangleMesh make_mesh(const data::Kind& kind, double unit);
-/// Where a rigid body touches the fluid, in its own frame: every vertex drawn back along its normal by \p
+/// Where a cell at rest touches the fluid, in its own frame: every vertex drawn back along its normal by \p
 /// retraction (lattice units). A platelet's rim is sharper than that, its normals would cross: it becomes a
 /// smaller spheroid instead. \throws InputError when nothing would be left of it.
 std::vector<mesh::Vec3> coupling_points(const data::Kind& kind, const mesh::TriangleMesh& rest,
                                         const data::Coupling& coupling);
+/// The same surface for a deformable platelet, as a map of its vertices; empty for other cells, which are
+/// drawn back along their normals, and without retraction.
+MirrorSurface mirror_surface(const data::Kind& kind, const mesh::TriangleMesh& rest,
+                             const data::Coupling& coupling);
 npfem::Material make_material(const data::Kind& kind, const LatticeUnits& units);
 /// The pairwise law; of contact.model: particle_in_kernel the one it is packed with.
 contact::Law make_contact(const data::Scene& scene, const LatticeUnits& units);

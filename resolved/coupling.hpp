@@ -46,6 +46,18 @@ HEMO_HD HEMO_INLINE Vector<T> couple_force(const Vector<T>& g, const Vector<T>& 
   return cross(g, to - from);
 }
 
+/// L f at a vertex, for a coupling surface that is a linear map of the vertices, x_s = x - L x: a vertex and
+/// its mirror image come closer to each other by the share `axial` of their distance, their middle to the
+/// centre (the mean of all vertices) by `radial` of its way; given are halves of the shares. L is symmetric:
+/// L v is the velocity that the coupling point lacks, L J what the impulse J that it gives the fluid adds to
+/// the force on the vertices, - J. Rows sum to zero and entries are numbers: both momenta are kept, and rigid
+/// motions are carried along.
+template <class T>
+HEMO_HD HEMO_INLINE Vector<T> drawn_in(const T& half_axial, const T& half_radial, const Vector<T>& f,
+                                       const Vector<T>& mirrored, const Vector<T>& mean) {
+  return half_axial * (f - mirrored) + half_radial * ((f + mirrored) - (mean + mean));
+}
+
 /// v_pred = (m v + k a w + h F)/(m + k a), written as an increment over w: rounding then touches a small
 /// number and momentum does not drift.
 template <class T>

@@ -55,7 +55,7 @@ void Simulation<Real>::couple_conservative() {
 /// function of the vertices, so its velocity is v - delta dn/dt, and a force J at x_s acts on the vertices as
 /// J and, through -delta (dn/dx)^T, as forces on the corners of the triangles around. Virtual work and both
 /// momenta are then conserved, and a rigid rotation of fluid and cell together feels no force. dn/dt and J
-/// are those of the last step.
+/// are those of the last step. Deformable platelets: drawn_in() in place of the normals.
 template <class Real>
 void Simulation<Real>::retract() {
   const Real delta = static_cast<Real>(scene_.coupling.retraction);
@@ -78,10 +78,17 @@ void Simulation<Real>::retract() {
             std::fill(force, force + length, Real(0));
             if constexpr (requires { g.held(); })
               continue;  // rigid bodies move their coupling points themselves
-            std::fill(sum, sum + length, Real(0));
-            for (const auto& t : triangles) add_normals<lanes>(t, x, v, sum, rate);
             const Node4<Real>* J =
                 impulse_.data() + group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
+            if (!group.surface.mirror.empty()) {
+              draw_in<lanes>(
+                  group.surface, [&](int k) { return all_lanes<lanes>(v, k); }, rate);
+              draw_in<lanes>(
+                  group.surface, [&](int k) { return all_lanes<lanes>(J + k * lanes); }, force);
+              continue;
+            }
+            std::fill(sum, sum + length, Real(0));
+            for (const auto& t : triangles) add_normals<lanes>(t, x, v, sum, rate);
             for (int k = 0; k < vertices; ++k)
               to_unit_normal<lanes>(delta, J + k * lanes, sum + 3 * k * lanes, rate + 3 * k * lanes);
             for (const auto& t : triangles) add_couples<lanes>(t, x, sum, force);

@@ -40,6 +40,8 @@ struct CellCoupling {
   Node4<Real>*vertex, *site;          ///< [slot] relative to origin: membrane, retracted
   std::int32_t* origin;               ///< [body][3]
   mesh::Vec3* couple;                 ///< [cell] rigid bodies: torque of contact about the coupling points
+  const int* mirror;                  ///< [vertices] deformable platelets (drawn_in()); else null
+  Real half_axial, half_radial;
 
   static std::size_t shared_bytes(int vertices) {
     return 12 * static_cast<std::size_t>(vertices) * sizeof(Real);
@@ -65,6 +67,11 @@ struct CellCoupling {
       } else if (phase == 1 && cells.held) {  // rigid bodies move their coupling points themselves
         mesh::put3(V{Real(0), Real(0), Real(0)}, rate, n, k);
         mesh::put3(V{Real(0), Real(0), Real(0)}, couples, n, k);
+      } else if (phase == 1 && mirror) {
+        const auto lost = drawn(k, [&](int j) { return mesh::get3(v, n, j); }),
+                   forced = drawn(k, [&](int j) { return vector(impulse[slot(cell, j)]); });
+        mesh::put3(lost, rate, n, k);
+        mesh::put3(forced, couples, n, k);
       } else if (phase == 1) {
         V sum{Real(0), Real(0), Real(0)}, change = sum;
         for (int i = ring_begin[k]; i < ring_begin[k + 1]; ++i) {
@@ -85,12 +92,22 @@ struct CellCoupling {
     }
   }
 
+  /// drawn_in() of \p field at vertex k.
+  template <class Field>
+  HEMO_HD V drawn(int k, const Field& field) const {
+    V sum = field(0);
+    for (int j = 1; j < cells.vertices; ++j) sum = sum + field(j);
+    return drawn_in(half_axial, half_radial, field(k), field(mirror[k]),
+                    Real(1) / static_cast<Real>(cells.vertices) * sum);
+  }
+
   HEMO_HD void predict(unsigned cell, int k, const Real* x, const Real* v, const Real* rate,
                        const Real* couples) const {
     const int n = cells.vertices;
     const std::size_t s = slot(cell, k);
     V force = contact_force_on(s);
-    for (int i = ring_begin[k]; i < ring_begin[k + 1]; ++i) {
+    if (mirror) force = force + mesh::get3(couples, n, k);
+    for (int i = ring_begin[k]; !mirror && i < ring_begin[k + 1]; ++i) {
       const Corners& t = triangle[ring[i] >> 2];
       const int corner = ring[i] & 3;
       const V g =
@@ -154,6 +171,7 @@ struct CellCoupling {
       const std::size_t s = slot(cell, k);
       const V p = V{fraction[0], fraction[1], fraction[2]} + cells.get(cells.offset, cell, k),
               q = cells.held ? V{fraction[0], fraction[1], fraction[2]} + cells.get(cells.held, cell, k)
+                  : mirror   ? p - drawn(k, [&](int j) { return cells.get(cells.offset, cell, j); })
                              : p - delta * cells.get(cells.normal, cell, k);
       vertex[s] = {p.x, p.y, p.z, Real(0)};
       site[s] = {q.x, q.y, q.z, Real(0)};

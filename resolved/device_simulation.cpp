@@ -75,6 +75,13 @@ void DeviceSimulation<Real>::build_groups(const Simulation<Real>& host) {
       for (std::size_t k = 0; k < bodies->shape().arm.size(); ++k)
         depth_ =
             std::max(depth_, mesh::norm(mesh::subtract(bodies->shape().arm[k], bodies->shape().held[k])));
+    if (!group.surface.mirror.empty()) {
+      const auto& kind = scene_.cells.kinds[static_cast<std::size_t>(group.kind)];
+      const auto rest = make_mesh(kind, host.units().dx);
+      const auto at_rest = coupling_points(kind, rest, scene_.coupling);
+      for (std::size_t k = 0; k < at_rest.size(); ++k)  // half as much again for what deforms
+        depth_ = std::max(depth_, 1.5 * mesh::norm(mesh::subtract(rest.vertices[k], at_rest[k])));
+    }
     const mesh::TriangleMesh& rest =
         std::visit([](const auto& g) -> const mesh::TriangleMesh& { return g.rest(); }, group.cells);
     contact::Shape shape;
@@ -104,10 +111,12 @@ void DeviceSimulation<Real>::build_groups(const Simulation<Real>& host) {
     groups_.push_back({make(),
                        make_array(place, ring_begin),
                        make_array(place, ring),
+                       make_array(place, group.surface.mirror),
                        make_array(place, triangle),
                        make_array(place, mass),
                        make_array(place, weight),
                        make_array(place, inverse_metric),
+                       group.surface,
                        CellCoupling<Real>{},
                        {}});
   }
@@ -215,7 +224,10 @@ void DeviceSimulation<Real>::connect() {
         vertex_.data(),
         site_.data(),
         reinterpret_cast<std::int32_t*>(origin_.data()),
-        nullptr};
+        nullptr,
+        here.mirror.size() ? here.mirror.data() : nullptr,
+        static_cast<Real>(here.surface.axial / 2),
+        static_cast<Real>(here.surface.radial / 2)};
     if (auto* bodies = std::get_if<rigid::DeviceBodies<Real>>(&here.cells))
       here.coupling.couple = bodies->couples();
   }

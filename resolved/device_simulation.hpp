@@ -60,9 +60,10 @@ class DeviceSimulation {
   static constexpr std::size_t first_fluid_segment = 5;  ///< two per fluid step
   struct Group {
     std::variant<npfem::DeviceMembranes<Real>, rigid::DeviceBodies<Real>> cells;
-    Array<int> ring_begin, ring;
+    Array<int> ring_begin, ring, mirror;
     Array<Corners> triangle;
     Array<Real> mass, weight, inverse_metric;
+    MirrorSurface surface;
     CellCoupling<Real> coupling;
     std::vector<std::int64_t> id;  ///< [cell]
   };

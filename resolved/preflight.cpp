@@ -87,7 +87,7 @@ void check_cells(const Scene& scene, const LatticeUnits& units, std::vector<std:
     mesh::TriangleMesh rest;
     try {
       rest = make_mesh(kind, units.dx);
-      if (kind.law == data::Kind::Law::rigid) coupling_points(kind, rest, scene.coupling);
+      coupling_points(kind, rest, scene.coupling);
     } catch (const Error& error) {
       problems.push_back("cells.kinds." + kind.name + ".shape: " + error.what());
       continue;

@@ -3,12 +3,19 @@
 /// surface (docs/adr/0008): coupling.hpp with a pack per number. Fields are [vertex][3][lane].
 
 #include <array>
+#include <vector>
 
 #include "core/block.hpp"
 #include "core/simd.hpp"
 #include "resolved/coupling.hpp"
 
 namespace hemowalk::resolved {
+
+/// Which vertex mirrors which, and the shares of drawn_in(). Empty: the normals' retraction.
+struct MirrorSurface {
+  std::vector<int> mirror;
+  double axial = 0, radial = 0;
+};
 
 /// Vertex k of a field, all lanes.
 template <int lanes, class Real>
@@ -35,15 +42,40 @@ HEMO_INLINE void add_normals(const std::array<int, 3>& t, const Real* x, const R
   }
 }
 
+/// The impulses of one vertex.
+template <int lanes, class Real>
+HEMO_INLINE Vector<Pack<Real, lanes>> all_lanes(const Node4<Real>* J) {
+  using P = Pack<Real, lanes>;
+  return {P([&](auto l) { return J[l].x; }), P([&](auto l) { return J[l].y; }),
+          P([&](auto l) { return J[l].z; })};
+}
+
 /// From the sum of area vectors round a vertex and its rate: rate <- delta dn/dt, sum <- the vertex's couple.
 template <int lanes, class Real>
 HEMO_INLINE void to_unit_normal(Real delta, const Node4<Real>* J, Real* sum, Real* rate) {
   using P = Pack<Real, lanes>;
-  const Vector<P> impulse{P([&](auto l) { return J[l].x; }), P([&](auto l) { return J[l].y; }),
-                          P([&](auto l) { return J[l].z; })};
+  const auto impulse = all_lanes<lanes>(J);
   const auto r = retraction(P(delta), all_lanes<lanes>(sum, 0), all_lanes<lanes>(rate, 0), impulse);
   set_lanes<lanes, Real>(r.rate, rate, 0);
   set_lanes<lanes, Real>(r.couple, sum, 0);
+}
+
+/// The mean over all vertices.
+template <int lanes, class Real, class Field>
+HEMO_INLINE Vector<Pack<Real, lanes>> mean_of(int vertices, const Field& field) {
+  auto sum = field(0);
+  for (int k = 1; k < vertices; ++k) sum = sum + field(k);
+  return Pack<Real, lanes>(Real(1) / static_cast<Real>(vertices)) * sum;
+}
+/// drawn_in() of \p field(k), all vertices.
+template <int lanes, class Real, class Field>
+HEMO_INLINE void draw_in(const MirrorSurface& s, const Field& field, Real* out) {
+  using P = Pack<Real, lanes>;
+  const int vertices = static_cast<int>(s.mirror.size());
+  const P axial(static_cast<Real>(s.axial / 2)), radial(static_cast<Real>(s.radial / 2));
+  const auto mean = mean_of<lanes, Real>(vertices, field);
+  for (int k = 0; k < vertices; ++k)
+    set_lanes<lanes, Real>(drawn_in(axial, radial, field(k), field(s.mirror[k]), mean), out, k);
 }
 
 /// Forces of the couples on the corners of a triangle.

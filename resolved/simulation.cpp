@@ -102,7 +102,8 @@ lbm::Vec3 Simulation<Real>::half_body_force() const {
 }
 
 /// x^n of every vertex, relative to a lattice node near its cell, and the point where it touches the fluid:
-/// drawn back along the normal by `retraction`, which cancels the hydrodynamic thickness of a smeared sheet.
+/// drawn back along the normal by `retraction`, which cancels the hydrodynamic thickness of a smeared sheet
+/// (platelets: to a smaller spheroid).
 template <class Real>
 void Simulation<Real>::read_positions() {
   const Real delta = static_cast<Real>(scene_.coupling.retraction);
@@ -135,12 +136,26 @@ void Simulation<Real>::read_positions() {
                     std::isfinite(node) ? static_cast<std::int32_t>(std::clamp(node, -1e6, 1e6)) : 0;
               }
             const std::size_t slot = group.first_marker + static_cast<std::size_t>(b) * vertices * lanes;
+            const MirrorSurface& surface = group.surface;
+            const auto at_lanes = [&](int k) {
+              return all_lanes<lanes>(offsets + (static_cast<std::size_t>(b) * vertices) * 3 * lanes, k);
+            };
+            Vector<Pack<Real, lanes>> middle{};
+            if (!surface.mirror.empty()) middle = mean_of<lanes, Real>(vertices, at_lanes);
             alignas(64) Real low[lanes], high[lanes];
             std::fill(low, low + lanes, std::numeric_limits<Real>::max());
             std::fill(high, high + lanes, std::numeric_limits<Real>::lowest());
             for (int k = 0; k < vertices; ++k) {
               const std::size_t at = (static_cast<std::size_t>(b) * vertices + k) * 3 * lanes;
               const Real *x = offsets + at, *normal = normals + at;
+              alignas(64) Real back[3 * lanes];
+              if (!surface.mirror.empty())
+                set_lanes<lanes, Real>(drawn_in(Pack<Real, lanes>(static_cast<Real>(surface.axial / 2)),
+                                                Pack<Real, lanes>(static_cast<Real>(surface.radial / 2)),
+                                                at_lanes(k), at_lanes(surface.mirror[k]), middle),
+                                       back, 0);
+              else
+                for (int i = 0; i < 3 * lanes; ++i) back[i] = delta * normal[i];
               Node4<Real>*vertex = vertices_.data() + slot + k * lanes,
               *site = sites_.data() + slot + k * lanes;
               for (int l = 0; l < lanes; ++l) {
@@ -152,8 +167,7 @@ void Simulation<Real>::read_positions() {
                   site[l] = {fraction[0][l] + r[l], fraction[1][l] + r[lanes + l],
                              fraction[2][l] + r[2 * lanes + l], Real(0)};
                 } else {
-                  site[l] = {px - delta * normal[l], py - delta * normal[lanes + l],
-                             pz - delta * normal[2 * lanes + l], Real(0)};
+                  site[l] = {px - back[l], py - back[lanes + l], pz - back[2 * lanes + l], Real(0)};
                 }
                 low[l] = std::min(low[l], std::min(pz, site[l].z));
                 high[l] = std::max(high[l], std::max(pz, site[l].z));

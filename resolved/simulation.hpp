@@ -26,6 +26,7 @@
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/npfem/membranes.hpp"
 #include "resolved/region.hpp"
+#include "resolved/retraction.hpp"
 #include "resolved/rigid/rigid.hpp"
 #include "resolved/surface_traction.hpp"
 #include "resolved/units.hpp"
@@ -49,6 +50,7 @@ struct Group {
   std::uint32_t first_marker = 0;  ///< of vertex k of cell c: first_marker + layout().at(c, k)
   std::vector<double> mass;        ///< [V] m_k: excess over the displaced fluid (paper: whole; peskin: none)
   std::vector<double> weight;      ///< [V] a_k = chi rho A_k dx (paper, peskin: A_k)
+  MirrorSurface surface = {};      ///< deformable platelets
 
   int count() const {
     return std::visit([](const auto& g) { return g.count(); }, cells);

@@ -27,7 +27,8 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
     mesh::TriangleMesh rest = make_mesh(k, units_.dx);
     const bool is_rigid = k.law == data::Kind::Law::rigid;
     mesh::TriangleMesh held = rest;
-    if (is_rigid) held.vertices = coupling_points(k, rest, scene_.coupling);
+    MirrorSurface surface = mirror_surface(k, rest, scene_.coupling);
+    if (is_rigid || !surface.mirror.empty()) held.vertices = coupling_points(k, rest, scene_.coupling);
     const std::vector<double> area = mesh::vertex_areas(held);
     const double density = k.density / units_.density,
                  displaced =
@@ -57,7 +58,7 @@ void Simulation<Real>::build_groups(const std::vector<InitialCell>& cells) {
       if (is_rigid) return rigid::RigidBodies<Real>(rigid::BodyType{rest, mass, metric, h_, held.vertices});
       return npfem::Membranes<Real>(std::make_shared<npfem::CellType>(rest, material, metric, h_));
     };
-    Group<Real> group{make(), kind, 0, 0, mass, weight};
+    Group<Real> group{make(), kind, 0, 0, mass, weight, std::move(surface)};
     for (std::size_t c = 0; c < cells.size(); ++c) {
       if (cells[c].kind != kind) continue;
       const double plane = decomposition_.localise(std::floor(cells[c].centre[2]));

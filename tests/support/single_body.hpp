@@ -61,14 +61,37 @@ inline int settling_steps(double nodes, double tau = 2) {
   return static_cast<int>(8 * nodes * nodes / ((tau - 0.5) / 3 * 4 * M_PI * M_PI));
 }
 
+/// About x, of the points of the only cell of \p sim, which x is a principal axis of.
+inline double spin(const resolved::Simulation<double>& sim) {
+  return std::visit(
+      [&](const auto& cells) {
+        if constexpr (requires { cells.angular_velocity(0); }) {
+          return cells.angular_velocity(0)[0];
+        } else {
+          const auto x = cells.positions(0);
+          const auto v = [&](int k, int d) { return cells.velocities()[cells.layout().at(0, k, d)]; };
+          mesh::Vec3 centre{}, drift{};
+          for (int k = 0; k < cells.vertices(); ++k)
+            for (int d = 0; d < 3; ++d)
+              centre[d] += x[k][d] / cells.vertices(), drift[d] += v(k, d) / cells.vertices();
+          double turn = 0, inertia = 0;
+          for (int k = 0; k < cells.vertices(); ++k) {
+            const double y = x[k][1] - centre[1], z = x[k][2] - centre[2];
+            turn += y * (v(k, 2) - drift[2]) - z * (v(k, 1) - drift[1]), inertia += y * y + z * z;
+          }
+          return turn / inertia;
+        }
+      },
+      sim.groups()[0].cells);
+}
+
 /// Angular velocity over shear rate of a free body between walls that move at +-U/2, as it lies.
 inline double rotation_rate(const BodyCase& c) {
   const data::Scene scene = scene_of(c);
   resolved::Simulation<double> sim(scene, {body_of(c)});
   const int steps = settling_steps(sim.block().ny);
   for (int i = 0; i < steps; ++i) sim.step();
-  const auto& body = std::get<rigid::RigidBodies<double>>(sim.groups()[0].cells);
-  return body.angular_velocity(0)[0] / sim.units().rate(scene.flow.shear_rate);
+  return spin(sim) / sim.units().rate(scene.flow.shear_rate);
 }
 
 /// Jeffery period times shear rate of a disc-like body of revolution (axis y): its angular velocity is

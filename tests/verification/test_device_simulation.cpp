@@ -89,6 +89,13 @@ TEST_P(DeviceSimulationTest, FollowsTheHostInDouble) {
   expect_close_in_double(GetParam(), small_scene(), 150);
 }
 
+TEST_P(DeviceSimulationTest, FollowsTheHostWithADeformablePlatelet) {
+  data::Scene scene = small_scene();
+  auto& platelet = scene.cells.kinds[1];
+  platelet.law = data::Kind::Law::paper, platelet.bending.modulus = 100e-18;
+  expect_close_in_double(GetParam(), scene, 60);
+}
+
 TEST_P(DeviceSimulationTest, FollowsTheHostWithSeveralFluidStepsAndIterations) {
   // An even number of fluid steps needs one graph, an odd one two. (Longer runs with few solid steps blow up
   // on both.)
