@@ -266,13 +266,15 @@ TEST(Capsule, OverNumericalChoices) {
     c.coupling.retraction = retraction;
     std::printf("retraction %.1f\n", retraction);
     const double shipped = run("shipped", c);
-    // Known: with retraction the membrane is the stiffer the better its coupling points follow the fluid.
-    const double allowed = retraction > 0 ? 0.12 : 0.02;
+    // Known: with retraction the membrane is the stiffer the better its coupling points follow the fluid,
+    // whose hold goes as chi/nu (2.5 % at tau 1, 1.6 % at theta 0.9); without it nothing of this matters (0.6
+    // %), nor does the mesh.
+    const double allowed = retraction > 0 ? 0.035 : 0.01;
     auto fine_steps = c, fine_mesh = c, slipping = c;
     fine_steps.tau = 1, fine_mesh.mesh = 1.5;
     slipping.coupling.theta_n = slipping.coupling.theta_t = 0.9;
     EXPECT_NEAR(run("tau 1", fine_steps) / shipped, 1, allowed);
-    EXPECT_NEAR(run("mesh n = 12", fine_mesh) / shipped, 1, 0.02);
+    EXPECT_NEAR(run("mesh n = 12", fine_mesh) / shipped, 1, 0.01);
     EXPECT_NEAR(run("theta 0.9", slipping) / shipped, 1, allowed);
   }
 }

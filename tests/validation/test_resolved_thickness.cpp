@@ -164,8 +164,9 @@ TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
     const double period = orbit(c, x.kind), sum = period / (2 * M_PI);
     std::printf("%s  %.3f | %.2f %.2f\n", x.name, x.dx, period, sum / 2 + std::sqrt(sum * sum / 4 - 1));
     std::fflush(stdout);
-    // Known: deformable platelets act some 10 to 15 % too thick.
-    EXPECT_NEAR(period / exact_period, 1, x.kind.law == data::Kind::Law::rigid ? 0.05 : 0.2)
+    // Known: the period of a deformable platelet is 7.8 % short at 0.5 um (too thick), right at 1/3 and 3.8 %
+    // long at 0.25 um (too thin: the rim's radius of curvature is then 0.7 dx).
+    EXPECT_NEAR(period / exact_period, 1, x.kind.law == data::Kind::Law::rigid ? 0.05 : 0.1)
         << x.name << x.dx;
   }
 }
