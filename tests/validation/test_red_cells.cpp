@@ -87,7 +87,7 @@ std::pair<double, double> turning(double rate, double kappa, double angle = 0.5,
   coupling.retraction = retraction;
   const auto r =
       test::red_cell_in_shear(std::min(100.0, 5000 / rate), kappa, strain, {}, angle, rate, from, coupling);
-  std::printf("%.0f, %.1f, %.1f, %.1f | %.3f %.1f %.4f %.4f\n", rate, kappa, angle, retraction, r.deformation,
+  std::printf("%.0f, %.1f, %.1f, %.2f | %.3f %.1f %.4f %.4f\n", rate, kappa, angle, retraction, r.deformation,
               r.inclination * 180 / M_PI, r.marker_turn / turn, r.shape_turn / turn);
   std::fflush(stdout);
   EXPECT_NEAR(r.volume, 1, 0.005);
