@@ -117,6 +117,7 @@ namespace {
 /// How far a platelet is drawn back, in units of the retraction of a flat sheet: its rim (fitted to the drag)
 /// and its faces, over the half thickness in dx (fitted to the Jeffery period, linear in between). Two faces
 /// that share kernels must come closer the thinner the platelet is. docs/evidence/validation.md, section 1.
+/// phi2 has no fit of its own: it takes phi3's.
 struct PlateletFit {
   double rim;
   std::array<std::array<double, 2>, 6> faces;  ///< {half thickness, depth}

@@ -264,15 +264,17 @@ TEST(Capsule, OverNumericalChoices) {
   for (const double retraction : {0.0, data::Coupling{}.retraction}) {
     Capsule c;
     c.coupling.retraction = retraction;
-    std::printf("retraction %.1f\n", retraction);
+    std::printf("retraction %.2f\n", retraction);
     const double shipped = run("shipped", c);
-    // Known: with retraction the membrane is the stiffer the better its coupling points follow the fluid.
-    const double allowed = retraction > 0 ? 0.12 : 0.02;
+    // Known: with retraction the membrane is the stiffer the better its coupling points follow the fluid,
+    // whose hold goes as chi/nu (2.5 % at tau 1, 1.6 % at theta 0.9); without it nothing of this matters (0.6
+    // %), nor does the mesh.
+    const double allowed = retraction > 0 ? 0.035 : 0.01;
     auto fine_steps = c, fine_mesh = c, slipping = c;
     fine_steps.tau = 1, fine_mesh.mesh = 1.5;
     slipping.coupling.theta_n = slipping.coupling.theta_t = 0.9;
     EXPECT_NEAR(run("tau 1", fine_steps) / shipped, 1, allowed);
-    EXPECT_NEAR(run("mesh n = 12", fine_mesh) / shipped, 1, 0.02);
+    EXPECT_NEAR(run("mesh n = 12", fine_mesh) / shipped, 1, 0.01);
     EXPECT_NEAR(run("theta 0.9", slipping) / shipped, 1, allowed);
   }
 }
@@ -313,7 +315,7 @@ TEST(Capsule, DeformsExactlyInTheLimitOfSmallCa) {
       const double shrink = std::pow(0.75, order);
       return (a[2] - shrink * a[1]) / (1 - shrink);
     };
-    std::printf("%.1f | %.4f %.4f %.4f (images %.4f); %.4f %.4f\n", retraction, a[0], a[1], a[2], -images,
+    std::printf("%.2f | %.4f %.4f %.4f (images %.4f); %.4f %.4f\n", retraction, a[0], a[1], a[2], -images,
                 limit(1), limit(2));
     std::fflush(stdout);
     EXPECT_LT(std::abs(a[2] - 1), std::abs(a[0] - 1)) << "does not converge";

@@ -281,34 +281,54 @@ TEST(PairCollision, UnderTheThreeCouplings) {
   };
   for (const bool platelet : {false, true}) {
     if (partner && platelet != (std::string(partner) == "platelet")) continue;
-    const auto ours = show("conservative", 0.5, platelet, 50, as_it_is);
+    const auto ours = show("conservative", 0.5, platelet, 50, as_it_is),
+               published = show("paper", 0.5, platelet, 50, test::use_paper_coupling);
     EXPECT_GT(ours.peak, 0.1);
-    EXPECT_LT(std::abs(ours.net), 0.5 * ours.peak);
-    show("paper", 0.5, platelet, 50, test::use_paper_coupling);
+    // What is kept is the small difference of large displacements (2 and 25 % of the largest).
+    EXPECT_LT(std::abs(ours.net), 0.4 * ours.peak);
+    // The published contact pulls to a point 1 um outside the neighbour and is not equal and opposite: cells
+    // part for good, farther than ours ever are (2.0 of 0.59 um); a platelet does not get past.
+    if (platelet) {
+      EXPECT_TRUE(std::isnan(published.net));
+    } else {
+      EXPECT_GT(published.net, 2 * ours.peak);
+    }
   }
   if (partner) return;
-  show("conservative", 0, false, 16, as_it_is);
-  show("peskin", 0, false, 16, peskin);
+  const auto ours = show("conservative", 0, false, 16, as_it_is),
+             sheets = show("peskin", 0, false, 16, peskin);
+  // Sheets half a spacing too thick, without retraction: cells approach one another (-0.16 um; ours -0.05)
+  // and push each other farther meanwhile (0.71, 0.54).
+  EXPECT_LT(sheets.net, -0.08);
+  EXPECT_LT(sheets.net, ours.net - 0.05);
+  EXPECT_GT(sheets.peak, 1.15 * ours.peak);
 }
 
-// Net displacements of red cells hold more than the collision: beside walls tumbling moves a cell to and fro.
+// Net displacements of red cells hold more than the collision: beside walls tumbling moves a cell to and fro,
+// which a cell alone shows and which is taken off here. What is left at the most, the partner's doing, falls
+// with the offset: as its square by the stresslet of a small body (a^3 gamma/r^2 during offset/gamma), faster
+// near by (contact, lubrication) and beside walls, which screen it.
 TEST(PairCollision, OverTheOffset) {
-  std::printf("offset/um | red cells at acceleration 50: net, peak displacement/um, of one of them alone\n");
-  double before = 1e9;
+  std::printf(
+      "offset/um | red cells at acceleration 50: net, peak displacement/um, of one of them alone, peak "
+      "without it\n");
+  double before = 1e9, last_offset = 1;
   for (const double offset : {2.5, 4.0, 5.5}) {
     const auto c = test::collide({test::red_cell_kind(0.5)}, 50, offset);
-    const double alone = test::drift_alone(50, offset);
-    std::printf("%.1f | %.4f %.4f %.4f\n", offset, c.net, c.peak, alone);
+    const double alone = test::drift_alone(50, offset), partner = c.peak - alone;
+    std::printf("%.1f | %.4f %.4f %.4f %.4f\n", offset, c.net, c.peak, alone, partner);
     std::fflush(stdout);
-    EXPECT_LT(c.peak, before);
-    EXPECT_GT(c.peak, c.net);
+    EXPECT_GT(partner, 0);
+    EXPECT_LT(partner, before * std::pow(last_offset / offset, 2));
     EXPECT_LT(std::abs(alone), c.peak) << "walls do more than the partner";
-    before = c.peak;
+    before = partner, last_offset = offset;
   }
 }
 
 // Smooth rigid spheres beyond the reach of contact: Stokes flow is reversible, they must part as they came.
-// What is left is inertia, of the order of Re = gamma a^2/nu = 4e-4 times the acceleration.
+// What is left is inertia, first order in Re = gamma a^2/nu = 4e-4 times the acceleration (0.7 to 0.9 Re of
+// the largest displacement are seen; 1.5 allowed), beside 5e-4 um for round-off: a straight line through both
+// accelerations leaves 1e-4 at none.
 TEST(PairCollision, OfSpheresIsReversible) {
   auto sphere = test::platelet_kind();
   sphere.shape.type = data::Shape::Type::sphere, sphere.shape.radii = {2e-6, 2e-6, 2e-6},
@@ -322,7 +342,7 @@ TEST(PairCollision, OfSpheresIsReversible) {
       std::printf("%.1f %.0f | %.4f %.4f\n", offset, s, c.net, c.peak);
       std::fflush(stdout);
       EXPECT_GT(c.peak, 0.1);
-      EXPECT_NEAR(c.net, 0, 0.05 * c.peak + 4e-3 * s * c.peak);
+      EXPECT_NEAR(c.net, 0, 1.5 * 4e-4 * s * c.peak + 5e-4);
     }
 }
 

@@ -163,8 +163,7 @@ double orbit(const BodyCase& c) {
   return std::nan("");
 }
 
-// The rigid platelet and deformable ones. Those are drawn back along their normals like any membrane; their
-// rim (radius of curvature 0.17 um) is sharper than that.
+// The rigid platelet and deformable ones, whose coupling surfaces are the same at rest.
 TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
   data::Kind rigid, paper, skalak;
   rigid.law = data::Kind::Law::rigid;
@@ -193,11 +192,9 @@ TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
     std::printf("%s  %.3f | %.2f %.2f; %.3f %.3f\n", x.name, x.dx, period,
                 sum / 2 + std::sqrt(sum * sum / 4 - 1), broadside, edgewise);
     std::fflush(stdout);
-    // Known: deformable platelets act some 10 to 15 % too thick.
-    EXPECT_NEAR(period / exact_period, 1, x.kind.law == data::Kind::Law::rigid ? 0.05 : 0.2)
-        << x.name << x.dx;
-    for (const double drag : {broadside, edgewise})
-      EXPECT_NEAR(drag, 1, x.kind.law == data::Kind::Law::rigid ? 0.05 : 0.12) << x.name << x.dx;
+    EXPECT_NEAR(period / exact_period, 1, 0.05) << x.name << x.dx;
+    EXPECT_NEAR(broadside, 1, 0.05) << x.name << x.dx;
+    EXPECT_NEAR(edgewise, 1, 0.05) << x.name << x.dx;
   }
 }
 

@@ -58,7 +58,9 @@ void expect_sound(const std::vector<SuspensionResult>& runs) {
 
 // Between walls plasma layers lower the stress at the nominal shear rate. What can be compared with wide
 // tubes is the core: its stress over its own shear rate at its own hematocrit. Pries et al. scatter by some
-// 10 % about their fit; the interior of these cells is as thin as plasma, which costs another few per cent.
+// 10 % about their fit. Above it dx 0.5 um with 258 vertices adds a third of what the cells add, eta - 1
+// (2.38 in place of 2.04 at Ht 0.32, ViscosityAndPowerOverLatticeSpacing extrapolated), and packings scatter:
+// two standard errors (of the default two packings rough ones; of a single packing nothing is known).
 TEST(Rheology, ViscosityOverHematocrit) {
   std::printf("| Ht | wide tube at the core's Ht |%s\n", columns);
   double before = 1;
@@ -69,17 +71,18 @@ TEST(Rheology, ViscosityOverHematocrit) {
     SuspensionCase c;
     c.hematocrit = hematocrit;
     const auto runs = shear(c);
-    const double core = test::mean_of(runs, &SuspensionResult::core_hematocrit).value;
-    std::printf("| %.2f | %.2f |", hematocrit, wide_tube_viscosity(core));
+    const double core = test::mean_of(runs, &SuspensionResult::core_hematocrit).value,
+                 wide = wide_tube_viscosity(core);
+    std::printf("| %.2f | %.2f |", hematocrit, wide);
     print_row(runs);
     expect_sound(runs);
     const double viscosity = test::mean_of(runs, &SuspensionResult::viscosity).value;
     EXPECT_GT(viscosity, before);
     before = viscosity;
-    EXPECT_NEAR(test::mean_of(runs, &SuspensionResult::core_viscosity).value / wide_tube_viscosity(core), 1,
-                0.4);
-    const auto finite = [](double error) { return std::isfinite(error) ? error : 0; };
     const auto middle = test::mean_of(runs, &SuspensionResult::core_viscosity);
+    EXPECT_LT(middle.value, 1.1 * wide + (wide - 1) / 3 + 2 * middle.error) << hematocrit;
+    EXPECT_GT(middle.value, 0.9 * wide - 2 * middle.error) << hematocrit;
+    const auto finite = [](double error) { return std::isfinite(error) ? error : 0; };
     nominal.push_back(hematocrit), inside.push_back(core);
     gap.push_back(viscosity);
     gap_error.push_back(finite(test::mean_of(runs, &SuspensionResult::viscosity).error));
@@ -169,9 +172,14 @@ TEST(Rheology, ViscosityAndPowerOverLatticeSpacing) {
              {runs[0].power.numerical() * runs[0].viscosity, runs[1].power.numerical() * runs[1].viscosity,
               runs[2].power.numerical() * runs[2].viscosity})
       .write();
-  // Known: the coupling acts too thick on a coarse lattice, 12 % at 0.5 um against 0.25 um.
-  EXPECT_NEAR(runs[0].viscosity / runs[2].viscosity, 1, 0.2);
-  EXPECT_NEAR(runs[1].viscosity / runs[2].viscosity, 1, 0.06);
+  // Known: the coupling acts too thick on a coarse lattice, 12 and 3.1 % at 0.5 and 1/3 um against 0.25 um.
+  // The excesses are as 4 to 1, which is order 2 (order 1: 3 to 1). One packing on three lattices, so that
+  // its scatter drops out of the differences; a quarter more is allowed.
+  const double excess[] = {runs[0].viscosity / runs[2].viscosity - 1,
+                           runs[1].viscosity / runs[2].viscosity - 1};
+  EXPECT_LT(excess[0], 0.15);
+  EXPECT_LT(std::abs(excess[1]), 0.04);
+  EXPECT_GT(excess[0], 3 * excess[1]) << "below order 1";
   for (const int i : {0, 1}) EXPECT_LT(runs[i + 1].power.numerical(), 0.75 * runs[i].power.numerical());
   for (const int subdivision : {12, 16}) runs.push_back(run(0.5, subdivision));
   std::printf("phi4\n");
@@ -209,28 +217,43 @@ TEST(Rheology, ViscosityOverBox) {
   for (const double v : viscosity) EXPECT_NEAR(v / viscosity.back(), 1, 0.1);
 }
 
-// How much the coupling's constants matter to a suspension: 15 um, 35 %, one packing.
+// How much the coupling's constants matter to a suspension: 15 um, 35 %, one packing. What slips makes up for
+// the thickness that the lattice adds, so the viscosity rises with theta and chi, which both hold the surface
+// to the fluid: by 1.9 % from the shipped theta to 0.99 (nearly none is left), by 3.2 % from half the shipped
+// chi to it. Half as much again is allowed; the kernel matters less (1.3 %).
 TEST(Rheology, ViscosityOverTheCoupling) {
   SuspensionCase c;
   c.box = {15, 15, 15}, c.strain = 8;
   const auto cells = pack(test::suspension_scene(c, 1));
   std::printf("| θ | χ | retraction | worst volume |%s\n", columns);
   const data::Coupling shipped;
-  double reference = 0;
   const auto run = [&](double theta, double chi) {
     c.coupling.theta_n = c.coupling.theta_t = theta, c.coupling.chi = chi;
     const auto r = test::shear_suspension(c, cells, test::suspension_scene(c, 1));
     std::printf("| %.2f | %.2f | %.2f | %.4f |", theta, chi, c.coupling.retraction, r.volume);
     print_row({r});
-    EXPECT_NEAR(r.volume, 1, 0.02);
-    if (reference == 0) reference = r.viscosity;
+    EXPECT_NEAR(r.volume, 1, 0.003);  // 0.1 % is seen; kept by k_v
+    return r.viscosity;
   };
-  run(shipped.theta_n, shipped.chi);
-  for (const double theta : {0.99, 0.9, 0.8, 0.5}) run(theta, shipped.chi);
-  for (const double chi : {1.0, 1.5}) run(shipped.theta_n, chi);
+  const double reference = run(shipped.theta_n, shipped.chi), tight = run(0.99, shipped.chi);
+  EXPECT_GT(tight, reference);
+  EXPECT_LT(tight, 1.03 * reference);
+  double before = reference;
+  for (const double theta : {0.9, 0.8, 0.5}) {
+    const double viscosity = run(theta, shipped.chi);
+    EXPECT_LT(viscosity, before) << theta;
+    before = viscosity;
+  }
+  const double half = run(shipped.theta_n, 0.5 * shipped.chi),
+               three_quarters = run(shipped.theta_n, 0.75 * shipped.chi);
+  EXPECT_GT(half, 0.95 * reference);
+  EXPECT_GT(three_quarters, half);
+  EXPECT_GT(reference, three_quarters);
   std::printf("phi4\n");
   c.coupling = data::Coupling::with(data::Coupling::Kernel::phi4);
-  for (const double theta : {0.97, 0.9}) run(theta, c.coupling.chi);
+  const double wide = run(0.97, c.coupling.chi);
+  EXPECT_NEAR(wide / reference, 1, 0.02);
+  EXPECT_LT(run(0.9, c.coupling.chi), wide);
 }
 
 }  // namespace

@@ -119,7 +119,8 @@ TEST(UniaxialTension, FollowsBarthesBiesel) {
 
 // Bending of the Evans-Fung shape: energy 2 k_b int H^2 dA, and the force density k_b (2 Lap H + 4 H (H^2 -
 // K)) along the outward normal (H > 0 where convex) through its work against smooth normal displacements psi.
-// Vertex by vertex the discrete force does not converge on such meshes; its work does.
+// Vertex by vertex the discrete force does not converge on such meshes; its work does, in the dimple late:
+// with the meshes of red cells, 258 to 4098 vertices, it is 2.8 to 1.8 times too large there.
 TEST(Helfrich, EnergyAndForceOfTheBiconcaveShape) {
   NEED_REFERENCE(folder, "rbc_exact_bending");
   const Curve size(folder + "/biconcave_curvatures__rbc_exact_bending.csv"),
@@ -155,25 +156,32 @@ TEST(Helfrich, EnergyAndForceOfTheBiconcaveShape) {
   }
   Material m;
   m.bending = Bending::helfrich, m.reference_curvature = 0, m.bending_modulus = 1;
-  std::printf("vertices  energy/k_b (%.2f)  work on three modes / k_b (%.1f %.1f %.1f)\n", exact_energy,
+  std::printf("vertices  energy/k_b (%.2f)  work on three modes / k_b (%.2f %.2f %.2f)\n", exact_energy,
               exact_work[0], exact_work[1], exact_work[2]);
-  double finest = 0, work[3] = {};
-  for (const int n : {8, 16, 32, 64}) {
+  double finest = 0, work[3] = {}, coarser[3] = {};
+  for (const int n : {8, 16, 32, 64, 128}) {
     const auto rest = mesh::red_cell(1, n);
     const auto normal = mesh::vertex_normals(rest);
     const CellType type(rest, m, std::vector<double>(normal.size(), 400), 0.25);
     const auto f = forces(type, rest.vertices);
-    for (double& w : work) w = 0;
+    for (int j = 0; j < 3; ++j) coarser[j] = work[j], work[j] = 0;
     for (std::size_t k = 0; k < f.size(); ++k) {
       const auto& p = rest.vertices[k];
       const double angle = std::atan2(std::hypot(p[0], p[2]), std::abs(p[1]));
       for (int j = 0; j < 3; ++j) work[j] += radius * mesh::dot(f[k], normal[k]) * modes[j](angle);
     }
     finest = energy(type, rest.vertices).bending;
-    std::printf("%zu  %.2f  %.1f %.1f %.1f\n", f.size(), finest, work[0], work[1], work[2]);
+    std::printf("%zu  %.2f  %.2f %.2f %.2f\n", f.size(), finest, work[0], work[1], work[2]);
   }
   EXPECT_NEAR(finest / exact_energy, 1, 0.01);
-  for (int j = 0; j < 3; ++j) EXPECT_NEAR(work[j], exact_work[j], 0.05 * exact_work[1]) << "mode " << j;
+  // Of its own value: the dimple is not yet there with 65 538 vertices (7 %), but falls in by order 2; the
+  // shoulder and the rim are.
+  const double allowed[] = {0.1, 0.01, 0.01};
+  for (int j = 0; j < 3; ++j) {
+    EXPECT_NEAR(work[j] / exact_work[j], 1, allowed[j]) << "mode " << j;
+    const double limit = work[j] + (work[j] - coarser[j]) / 3;
+    EXPECT_NEAR(limit / exact_work[j], 1, 0.015) << "mode " << j << ", extrapolated by order 2";
+  }
 }
 
 }  // namespace

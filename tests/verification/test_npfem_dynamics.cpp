@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "core/data/scene.hpp"
 #include "resolved/mesh/rotation.hpp"
 #include "resolved/npfem/membranes.hpp"
 #include "resolved/npfem/reference.hpp"
@@ -167,46 +168,58 @@ TEST_F(Dynamics, StretchedRedCellMatchesTheAuthorsSolver) {
 }
 
 /// One iteration per step is enough: the paper's red cell in lattice units (dx 0.5 um, dt 0.125 us), moduli
-/// and shear rate times 16 and 50, inertia m + a with a = 8/3 rho A dx and Stokes-like drag towards a shear
-/// flow.
+/// and shear rate times the acceleration, inertia m + a with a = chi rho A dx as shipped and Stokes-like drag
+/// towards a shear flow. Prints the table of docs/evidence/solid.md.
 TEST_F(Dynamics, OneIterationFollowsTheConvergedSolution) {
-  for (double s : {16.0, 50.0}) {
-    const auto run = [s](int iterations) {
-      auto rest = mesh::red_cell(2, 8);
-      Material m;
-      for (double* modulus : {&m.B, &m.C, &m.D, &m.volume_modulus}) *modulus *= s / 8200;
-      m.bending_modulus *= 4 * s / 8200;
-      m.drag_per_area = drag_per_area_of(0.9) / 128.125 * 0.125 * 0.25;
-      const auto area = mesh::vertex_areas(rest);
-      const double whole = std::accumulate(area.begin(), area.end(), 0.0), rate = 1.25e-5 * s;
-      std::vector<double> metric;
-      for (double a : area) metric.push_back(0.278 + 8.0 / 3 * a);
-      Membranes<double> cells(std::make_shared<const CellType>(rest, m, metric, 1));
-      cells.add(0, {0, 0, 0}, mesh::rotation({1, 0.3, 0.2}, 0.7));
-      std::vector<Vec3> v;
-      for (const auto& p : cells.positions(0)) v.push_back({0, 0, rate * p[1]});
-      cells.set_velocities(0, v);
-      const auto at = cells.layout();
-      for (int i = 0; i < 300; ++i) {
-        for (int k = 0; k < cells.vertices(); ++k)
-          for (int d = 0; d < 3; ++d) {
-            const double u = d == 2 ? rate * cells.offsets()[at.at(0, k, 1)] : 0;
-            const double now = cells.velocities()[at.at(0, k, d)];
-            const double drag = 0.5 * 6 * std::numbers::pi * 7.82 * area[k] / whole / metric[k];
-            cells.predicted()[at.at(0, k, d)] = now - drag * (now - u);
-          }
-        cells.step({.iterations = iterations});
-      }
-      return cells.positions(0);
-    };
-    const auto converged = run(15), once = run(1), twice = run(2);
-    const double one = support::largest_difference(once, converged) / 7.82;
-    const double two = support::largest_difference(twice, converged) / 7.82;
-    EXPECT_LT(one, 2e-4) << s;  // of the radius, after a strain of 300 rate
-    EXPECT_LT(two, one / 2) << s;
-    printf(
-        "[ one step ] acceleration %g: largest error %.1e of the radius with one iteration, %.1e with two\n",
-        s, one, two);
+  const auto run = [](double s, double kappa, int iterations) {
+    auto rest = mesh::red_cell(2, 8);
+    Material m;
+    for (double* modulus : {&m.B, &m.C, &m.D, &m.volume_modulus}) *modulus *= s / 8200;
+    m.bending_modulus *= 4 * s / 8200;
+    m.drag_per_area = drag_per_area_of(kappa) / 128.125 * 0.125 * 0.25;
+    const auto area = mesh::vertex_areas(rest);
+    const double whole = std::accumulate(area.begin(), area.end(), 0.0), rate = 1.25e-5 * s;
+    std::vector<double> metric;
+    for (double a : area) metric.push_back(0.278 + data::Coupling{}.chi * a);
+    Membranes<double> cells(std::make_shared<const CellType>(rest, m, metric, 1));
+    cells.add(0, {0, 0, 0}, mesh::rotation({1, 0.3, 0.2}, 0.7));
+    std::vector<Vec3> v;
+    for (const auto& p : cells.positions(0)) v.push_back({0, 0, rate * p[1]});
+    cells.set_velocities(0, v);
+    const auto at = cells.layout();
+    for (int i = 0; i < 300; ++i) {
+      for (int k = 0; k < cells.vertices(); ++k)
+        for (int d = 0; d < 3; ++d) {
+          const double u = d == 2 ? rate * cells.offsets()[at.at(0, k, 1)] : 0;
+          const double now = cells.velocities()[at.at(0, k, d)];
+          const double drag = 0.5 * 6 * std::numbers::pi * 7.82 * area[k] / whole / metric[k];
+          cells.predicted()[at.at(0, k, d)] = now - drag * (now - u);
+        }
+      cells.step({.iterations = iterations});
+    }
+    return cells.positions(0);
+  };
+  // Allowed of the radius with one iteration: twice what is measured. Started from v_pred it misses 8 to 22
+  // times as much (docs/evidence/solid.md).
+  const struct {
+    double acceleration, kappa, allowed;
+  } cases[] = {{1, 0, 3e-6}, {16, 0.9, 2e-5}, {50, 0.9, 1.6e-4}, {50, 0, 2.2e-3}};
+  printf("acceleration, kappa, strain: largest (rms) error of the radius with 1, 2, 3 iterations\n");
+  for (const auto& c : cases) {
+    const auto converged = run(c.acceleration, c.kappa, 15);
+    double before = c.allowed;
+    printf("%g, %g, %.3f:", c.acceleration, c.kappa, 300 * 1.25e-5 * c.acceleration);
+    for (const int iterations : {1, 2, 3}) {
+      const auto x = run(c.acceleration, c.kappa, iterations);
+      double square = 0;
+      for (std::size_t k = 0; k < x.size(); ++k)
+        square += std::pow(mesh::norm(mesh::subtract(x[k], converged[k])), 2);
+      const double error = support::largest_difference(x, converged) / 7.82;
+      printf("  %.1e (%.1e)", error, std::sqrt(square / static_cast<double>(x.size())) / 7.82);
+      EXPECT_LT(error, before) << c.acceleration << ", " << c.kappa << ", " << iterations << " iterations";
+      before = error / 1.5;  // each takes a good part of what is left
+    }
+    printf("\n");
   }
 }
 
