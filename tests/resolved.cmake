@@ -3,7 +3,7 @@ if(TARGET hemowalk_resolved)
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
             verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp verification/test_replaceable.cpp
-            verification/test_resolved_orientation.cpp
+            verification/test_resolved_orientation.cpp verification/test_scene_generality.cpp
     LINK hemowalk_resolved LABELS unit verification)
   hemowalk_test(test_couplings
     SOURCES unit/test_surface_traction.cpp verification/test_resolved_couplings.cpp LINK hemowalk_resolved LABELS unit verification)
