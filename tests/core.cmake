@@ -6,6 +6,8 @@ foreach(name statistics units yaml io trajectories transport_law)
   hemowalk_test(test_core_${name} SOURCES unit/test_core_${name}.cpp LINK hemowalk_data LABELS unit)
 endforeach()
 
+hemowalk_test(test_environment SOURCES unit/test_environment.cpp LINK hemowalk_core LABELS unit)
+
 # The formats of campaigns and cases, without the programs behind them.
 hemowalk_library(test_campaign_format
   SOURCES ${CMAKE_SOURCE_DIR}/coarse/case.cpp ${CMAKE_SOURCE_DIR}/workflow/campaign.cpp

@@ -3,19 +3,23 @@ if(TARGET hemowalk_resolved)
     SOURCES unit/test_resolved_units.cpp verification/test_resolved_simulation.cpp verification/test_resolved_friction.cpp
             verification/test_resolved_tube.cpp verification/test_resolved_recovery.cpp
             verification/test_resolved_platelet.cpp verification/test_resolved_wall_drag.cpp verification/test_resolved_energy.cpp verification/test_replaceable.cpp
-            verification/test_resolved_orientation.cpp
+            verification/test_resolved_orientation.cpp verification/test_scene_generality.cpp
     LINK hemowalk_resolved LABELS unit verification)
   hemowalk_test(test_couplings
     SOURCES unit/test_surface_traction.cpp verification/test_resolved_couplings.cpp LINK hemowalk_resolved LABELS unit verification)
   # Three processes, which cut groups of one and two from themselves; on any number of cores, as any user.
+  function(hemowalk_ranks_test test count program)
+    add_test(NAME ${test} COMMAND ${MPIEXEC_EXECUTABLE} -n ${count} --bind-to none $<TARGET_FILE:${program}> ${ARGN})
+    set_tests_properties(${test} PROPERTIES LABELS verification TIMEOUT 600 ENVIRONMENT
+      "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMP_NUM_THREADS=1")
+  endfunction()
   foreach(test test_resolved_ranks test_device_ranks)
     add_executable(${test} ranks/ranks_main.cpp ranks/${test}.cpp)
     target_link_libraries(${test} PRIVATE hemowalk_resolved GTest::gtest)
     target_include_directories(${test} PRIVATE ${CMAKE_SOURCE_DIR}/tests)
-    add_test(NAME ${test} COMMAND ${MPIEXEC_EXECUTABLE} -n 3 --bind-to none $<TARGET_FILE:${test}>)
-    set_tests_properties(${test} PROPERTIES LABELS verification TIMEOUT 600 ENVIRONMENT
-      "OMPI_ALLOW_RUN_AS_ROOT=1;OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1;OMPI_MCA_rmaps_base_oversubscribe=1;OMPI_MCA_mpi_yield_when_idle=1;OMP_NUM_THREADS=1")
+    hemowalk_ranks_test(${test} 3 ${test})
   endforeach()
+  hemowalk_ranks_test(test_four_ranks 4 test_resolved_ranks "--gtest_filter=Ranks.*:*.FourAgreeWithOne")
   target_sources(test_resolved_ranks PRIVATE ranks/test_ranks.cpp)
   # Run by hand, with mpirun: docs/evidence/scaling.md.
   add_executable(bench_ranks benchmarks/bench_ranks.cpp)

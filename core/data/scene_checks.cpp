@@ -157,6 +157,33 @@ void check_time(const Value& v, Problems& problems) {
                        " s (from fluid.dx, tau, kinematic_viscosity and acceleration) use a longer time");
 }
 
+/// Keys of the coupling that the scheme does not read, given another value than the usual one.
+void check_coupling(const Value& v, Problems& problems) {
+  const Value *scheme = v.find("coupling.scheme"), *kernel = v.find("coupling.kernel");
+  if (!scheme || !kernel) return;
+  const Coupling usual = Coupling::with(kernel->choice<Coupling::Kernel>());
+  const auto idle = [&](const std::string& key, const std::vector<std::string>& readers,
+                        const auto& is_usual) {
+    if (std::find(readers.begin(), readers.end(), scheme->text()) != readers.end()) return;
+    const Value* value = v.find("coupling." + key);
+    if (!value || !value->given || is_usual(*value)) return;
+    std::string words;
+    for (const std::string& word : readers) words += (words.empty() ? "" : " or ") + word;
+    problems.warn(value->mark, "`coupling." + key + "` has no effect (it belongs to scheme: " + words +
+                                   ", not " + scheme->text() + ") remove it");
+  };
+  idle("cycles", {"paper"}, [&](const Value& x) { return x.integer() == usual.cycles; });
+  idle("velocity_cap", {"paper"}, [](const Value& x) { return x.type == Value::Type::text; });  // off
+  idle("median_filter", {"paper"}, [&](const Value& x) { return x.boolean() == usual.median_filter; });
+  idle("iterations", {"conservative", "paper"},
+       [&](const Value& x) { return x.integer() == usual.iterations; });
+  idle("integrator", {"conservative"}, [](const Value& x) { return x.index == 0; });
+  idle("theta", {"conservative"}, [&](const Value& x) {
+    return x.numbers() == std::vector<double>{usual.theta_n, usual.theta_t};
+  });
+  idle("chi", {"conservative"}, [&](const Value& x) { return std::abs(x.number() / usual.chi - 1) < 1e-9; });
+}
+
 void check_place(const Value& v, Problems& problems) {
   const Value *distribution = v.find("place.distribution"), *solid = v.find("place.solid"),
               *fluid = v.find("place.fluid"), *coupling = v.find("place.coupling");
@@ -176,6 +203,7 @@ void check_scene(const Value& scene, Problems& problems) {
   check_flow(scene, problems);
   check_cells(scene, problems);
   check_time(scene, problems);
+  check_coupling(scene, problems);
   check_place(scene, problems);
 }
 

@@ -82,7 +82,7 @@ Field coupling() {
   };
   const auto chi = [](Kernel k, const std::string& word) {
     return with_default("chi", number().above(0).at_most(100), format_number(Coupling::with(k).chi),
-                        "coupling mass, in rho A dx")
+                        "coupling mass of scheme: conservative, in rho A dx")
         .when("kernel", {word});
   };
   const Field cap = any_of({choice({"off"}), number().above(0).at_most(0.5)});
@@ -91,7 +91,8 @@ Field coupling() {
                    "how cells and plasma exchange momentum"),
       with_default("kernel", kernel, "phi3", "regularised delta function").when("scheme", conservative),
       with_default("kernel", kernel, "phi4", "regularised delta function").when("scheme", others),
-      with_default("cycles", integer().at_least(1).at_most(100), "1", "multi-direct-forcing cycles"),
+      with_default("cycles", integer().at_least(1).at_most(100), "1",
+                   "multi-direct-forcing cycles of scheme: paper"),
       with_default("solid_every", every, "1", "fluid steps per solid step").when("scheme", ours),
       with_default("solid_every", every, "2", "fluid steps per solid step").when("scheme", paper),
       retraction(Kernel::phi2, "phi2"),
@@ -101,7 +102,7 @@ Field coupling() {
           .when("scheme", others),
       with_default("theta", list_of(number().at_least(0).at_most(1), 2, 2),
                    "[" + format_number(usual.theta_n) + ", " + format_number(usual.theta_t) + "]",
-                   "slip correction, normal and tangential"),
+                   "slip correction of scheme: conservative, normal and tangential"),
       chi(Kernel::phi2, "phi2"),
       chi(Kernel::phi3, "phi3"),
       chi(Kernel::phi4, "phi4"),

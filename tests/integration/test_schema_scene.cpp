@@ -369,6 +369,45 @@ TEST(SchemaScene, KeysWithoutEffectAreWarnedAbout) {
   EXPECT_EQ(s.find_kind("platelet")->kappa_damping, 0);
 }
 
+TEST(SchemaScene, KeysThatTheSchemeDoesNotReadAreWarnedAbout) {
+  const auto warnings = [](const std::string& keys) {
+    return parse_scene("format: hemowalk.scene/1\ncoupling: {" + keys + "}\n", "s.yaml").warnings;
+  };
+  const auto expect_idle = [&](const std::string& scheme, const std::string& key, const std::string& value,
+                               const std::string& readers) {
+    const auto found = warnings("scheme: " + scheme + ", " + key + ": " + value);
+    ASSERT_EQ(found.size(), 1u) << scheme << " " << key;
+    EXPECT_TRUE(contains(found[0], "s.yaml:2:")) << found[0];
+    EXPECT_TRUE(contains(found[0], ": `coupling." + key + "` has no effect (it belongs to scheme: " +
+                                       readers + ", not " + scheme + ") remove it"))
+        << found[0];
+  };
+  for (const char* scheme : {"conservative", "peskin"}) {
+    expect_idle(scheme, "cycles", "2", "paper");
+    expect_idle(scheme, "velocity_cap", "0.1", "paper");
+    expect_idle(scheme, "median_filter", "true", "paper");
+  }
+  for (const char* scheme : {"paper", "peskin"}) {
+    expect_idle(scheme, "theta", "[0.9, 0.97]", "conservative");
+    expect_idle(scheme, "chi", "1.5", "conservative");
+  }
+  expect_idle("peskin", "iterations", "2", "conservative or paper");
+  expect_idle("peskin", "integrator", "runge_kutta", "conservative");
+  for (const char* scheme : {"conservative", "paper"}) expect_idle(scheme, "force_cap", "3 pN", "peskin");
+  // Who reads them is not told, nor who gives what a scheme has anyway: all keys of a written scene are
+  // given.
+  EXPECT_TRUE(warnings("cycles: 1, velocity_cap: off, median_filter: false").empty());
+  EXPECT_TRUE(warnings("theta: [0.9, 0.5], chi: 1, iterations: 3, integrator: runge_kutta").empty());
+  EXPECT_TRUE(
+      warnings("scheme: paper, cycles: 4, velocity_cap: 0.1, median_filter: false, iterations: 2").empty());
+  EXPECT_TRUE(warnings("scheme: peskin, force_cap: 3 pN").empty());
+  for (const char* scheme : {"conservative", "paper", "peskin"}) {
+    const Scene s =
+        parse_scene("format: hemowalk.scene/1\ncoupling: {scheme: " + std::string(scheme) + "}\n", "s.yaml");
+    EXPECT_TRUE(parse_scene(s.source_text, "again.yaml").warnings.empty()) << scheme;
+  }
+}
+
 TEST(SchemaScene, FilesAreFoundBesideTheSceneAndCountByContent) {
   const fs::path folder = fs::temp_directory_path() / ("hemowalk_scene_" + std::to_string(::getpid()));
   const std::string text =

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Scenes for 1, 2 and 3 ranks, what all ranks together hold, and groups of ranks.
+/// \file Scenes for 1 to 4 ranks, what all ranks together hold, and groups of ranks.
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +14,9 @@ namespace hemowalk::test {
 
 using namespace resolved;
 
-/// 24 x 28 x 60 nodes: three slabs are just thick enough for a red cell.
-inline data::Scene long_scene(double acceleration = 32) {
-  return test::plasma_scene({12, 14, 30}, acceleration);
+/// 24 x 28 x \p planes nodes: slabs of 20 planes are just thick enough for a red cell.
+inline data::Scene long_scene(double acceleration = 32, int planes = 60) {
+  return test::plasma_scene({12, 14, 0.5 * planes}, acceleration);
 }
 
 /// Red cells across every border of two and of three slabs (planes 0, 20, 30, 40), in contact with each other

@@ -1,6 +1,6 @@
-// The resolved solver on 1, 2 and 3 ranks: the same flow to round-off, cells that wander through all slabs,
-// budgets over all ranks, restarts on as many and on other ranks. Started with three ranks; groups of fewer
-// are cut from them.
+// The resolved solver on 1 to 4 ranks: the same flow to round-off, cells that wander through all slabs,
+// budgets over all ranks, restarts on as many and on other ranks. Started with three ranks (one case with
+// four); groups of fewer are cut from them.
 
 #include <omp.h>
 #include <unistd.h>
@@ -18,24 +18,27 @@ namespace {
 
 using namespace test;
 
+/// The runs of \p counts ranks against that of one.
 template <class Real>
-void expect_agreement(const data::Scene& scene, int steps, double relative) {
+void expect_agreement(const data::Scene& scene, int steps, double relative,
+                      const std::vector<InitialCell>& cells = crowd(),
+                      const std::vector<int>& counts = {2, 3}) {
   Whole one, start;
-  for (const int n : {1, 2, 3})
+  on(1, [&](const mpi::Ranks& ranks) {
+    Simulation<Real> sim(scene, cells, ranks);
+    start = whole(sim);
+    for (int i = 0; i < steps; ++i) sim.step();
+    one = whole(sim);
+  });
+  for (const int n : counts)
     on(n, [&](const mpi::Ranks& ranks) {
-      Simulation<Real> sim(scene, crowd(), ranks);
-      if (n == 1) start = whole(sim);
-      double contacts = 0;
+      Simulation<Real> sim(scene, cells, ranks);
       for (int i = 0; i < steps; ++i) sim.step();
-      contacts = static_cast<double>(sim.contact_summary().contacts);
+      double contacts = static_cast<double>(sim.contact_summary().contacts);
       ranks.sum({&contacts, 1});
       EXPECT_GT(contacts, 20) << "the cells should touch";
       const Whole many = whole(sim);
       if (!ranks.root()) return;
-      if (n == 1) {
-        one = many;
-        return;
-      }
       const double moved = largest_difference(one.position, start.position);
       EXPECT_GT(moved, 0.3) << "the cells should move";
       EXPECT_LT(largest_difference(many.velocity, one.velocity), relative * one.largest_speed)
@@ -53,6 +56,18 @@ TEST(RanksOfTheSolver, AgreeWithTwoSlipFactorsAndPointLoads) {
   scene.coupling.theta_t = 0.8;  // two fields are read, hence exchanged
   scene.cells.loads = {{2, "+z", 0.05, {0, 0, 20e-12}}, {2, "-z", 0.05, {0, 0, -20e-12}}};
   expect_agreement<double>(scene, 60, 1e-10);
+}
+
+// Slabs of 30 and 31 planes, and of 20, 20 and 21.
+TEST(RanksOfTheSolver, AgreeWithUnevenSlabs) { expect_agreement<double>(long_scene(32, 61), 60, 1e-10); }
+
+// Of four ranks each has one that is no neighbour. Borders at planes 0, 20, 40 and 60 of 81: all have a red
+// cell across. Needs four processes: test_four_ranks.
+TEST(RanksOfTheSolver, FourAgreeWithOne) {
+  if (world().count() < 4) GTEST_SKIP() << "started with fewer than four ranks";
+  auto cells = crowd();
+  cells.insert(cells.begin() + 4, {0, {12, 16, 79}, mesh::rotation({1, 0, 0}, 0.2), {}});
+  expect_agreement<double>(long_scene(32, 81), 60, 1e-10, cells, {4});
 }
 
 // The same with a round-off of 6e-8.

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <cstdio>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "core/check.hpp"
 #include "resolved/ibm/markers.hpp"
@@ -13,6 +15,10 @@ namespace hemowalk::ibm {
 namespace {
 
 const Block block{18, 12, 22};
+constexpr Kernel kernels[] = {Kernel::phi2, Kernel::phi3, Kernel::phi4};
+const char* name_of(Kernel kernel) {
+  return kernel == Kernel::phi2 ? "phi2" : kernel == Kernel::phi3 ? "phi3" : "phi4";
+}
 
 struct Cloud {
   std::vector<std::int32_t> body;
@@ -50,7 +56,7 @@ TEST(Markers, LinearFieldIsReadExactlyAwayFromTheFaces) {
     for (int j = -3; j < block.ny + 3; ++j)
       for (int i = -3; i < block.nx + 3; ++i)
         field[block.at(i, j, k)] = {i + .5, j + .5, k + .5, 1 + 2 * (i + .5) - (j + .5) + 3 * (k + .5)};
-  for (const Kernel kernel : {Kernel::phi2, Kernel::phi3, Kernel::phi4}) {
+  for (const Kernel kernel : kernels) {
     Markers<double> markers(block, Faces{}, kernel, cloud.body);
     markers.locate(cloud.origin.view(), cloud.local.view());
     markers.interpolate(field.view(), out.view());
@@ -71,11 +77,10 @@ TEST(Markers, SpreadingIsTheAdjointOfInterpolationAcrossHaloAndWalls) {
   // <I u, J> = <u, S J> when the walls are at rest: the weight beyond them reads zero and is booked as
   // impulse.
   Cloud cloud(500);
-  Faces faces;
-  Markers<double> markers(block, faces, Kernel::phi4, cloud.body);
-  markers.locate(cloud.origin.view(), cloud.local.view());
+  const Faces faces;
   auto u = random_field(1);
-  Array<Node4<double>> force(block.size()), read(500), value(500);
+  fill_velocity_halo(block, faces, u.view());
+  Array<Node4<double>> value(500);
   std::mt19937 gen(3);
   std::normal_distribution<double> g;
   double total[3] = {0, 0, 0};
@@ -83,85 +88,116 @@ TEST(Markers, SpreadingIsTheAdjointOfInterpolationAcrossHaloAndWalls) {
     v = {g(gen), g(gen), g(gen), 0};
     total[0] += v.x, total[1] += v.y, total[2] += v.z;
   }
-  fill_velocity_halo(block, faces, u.view());
-  markers.interpolate(u.view(), read.view());
-  markers.spread(value.view(), force.view());
-  const auto impulse = fold_force_halo(block, faces, force.view());
-  double left = 0, right = 0, sum[3] = {0, 0, 0};
-  for (int m = 0; m < 500; ++m)
-    left += read[m].x * value[m].x + read[m].y * value[m].y + read[m].z * value[m].z;
-  for (int k = 0; k < block.nz; ++k)
-    for (int j = 0; j < block.ny; ++j)
-      for (int i = 0; i < block.nx; ++i) {
-        const auto f = force[block.at(i, j, k)], v = u[block.at(i, j, k)];
-        right += f.x * v.x + f.y * v.y + f.z * v.z;
-        sum[0] += f.x, sum[1] += f.y, sum[2] += f.z;
-      }
-  EXPECT_NEAR(left, right, 1e-10);
-  for (int d = 0; d < 3; ++d) EXPECT_NEAR(sum[d] + impulse[0][d] + impulse[1][d], total[d], 1e-11);
-  EXPECT_NE(impulse[0][0], 0);  // some kernels did reach through a wall
+  for (const Kernel kernel : kernels) {
+    Markers<double> markers(block, faces, kernel, cloud.body);
+    markers.locate(cloud.origin.view(), cloud.local.view());
+    Array<Node4<double>> force(block.size()), read(500);
+    markers.interpolate(u.view(), read.view());
+    markers.spread(value.view(), force.view());
+    const auto impulse = fold_force_halo(block, faces, force.view());
+    double left = 0, right = 0, sum[3] = {0, 0, 0};
+    for (int m = 0; m < 500; ++m)
+      left += read[m].x * value[m].x + read[m].y * value[m].y + read[m].z * value[m].z;
+    for (int k = 0; k < block.nz; ++k)
+      for (int j = 0; j < block.ny; ++j)
+        for (int i = 0; i < block.nx; ++i) {
+          const auto f = force[block.at(i, j, k)], v = u[block.at(i, j, k)];
+          right += f.x * v.x + f.y * v.y + f.z * v.z;
+          sum[0] += f.x, sum[1] += f.y, sum[2] += f.z;
+        }
+    EXPECT_NEAR(left, right, 1e-10) << name_of(kernel);
+    for (int d = 0; d < 3; ++d)
+      EXPECT_NEAR(sum[d] + impulse[0][d] + impulse[1][d], total[d], 1e-11) << name_of(kernel);
+    EXPECT_NE(impulse[0][0], 0) << name_of(kernel);  // some kernels did reach through a wall
+  }
 }
 
 TEST(Markers, TorqueIsConservedAwayFromTheFaces) {
   Cloud cloud(200);
   for (auto& p : cloud.local) p = {3 + 0.6 * p.x, 3 + 0.5 * p.y, 3 + 0.7 * p.z, 0};
-  Markers<double> markers(block, Faces{}, Kernel::phi4, cloud.body);
-  markers.locate(cloud.origin.view(), cloud.local.view());
-  Array<Node4<double>> value(200), force(block.size());
+  Array<Node4<double>> value(200);
   std::mt19937 gen(3);
   std::normal_distribution<double> g;
-  double want = 0, got = 0;
+  double want = 0;
   for (int m = 0; m < 200; ++m) {
     value[m] = {g(gen), g(gen), g(gen), 0};
     want += cloud.local[m].y * value[m].z - cloud.local[m].z * value[m].y;
   }
-  markers.spread(value.view(), force.view());
-  for (int k = 0; k < block.nz; ++k)
-    for (int j = 0; j < block.ny; ++j)
-      for (int i = 0; i < block.nx; ++i) {
-        const auto f = force[block.at(i, j, k)];
-        got += (j + .5) * f.z - (k + .5) * f.y;
-      }
-  EXPECT_NEAR(got, want, 1e-10);
+  for (const Kernel kernel : kernels) {
+    Markers<double> markers(block, Faces{}, kernel, cloud.body);
+    markers.locate(cloud.origin.view(), cloud.local.view());
+    Array<Node4<double>> force(block.size());
+    markers.spread(value.view(), force.view());
+    double got = 0;
+    for (int k = 0; k < block.nz; ++k)
+      for (int j = 0; j < block.ny; ++j)
+        for (int i = 0; i < block.nx; ++i) {
+          const auto f = force[block.at(i, j, k)];
+          got += (j + .5) * f.z - (k + .5) * f.y;
+        }
+    EXPECT_NEAR(got, want, 1e-10) << name_of(kernel);
+  }
+}
+
+/// The kernels as they are published, of the distance: the hat, Roma, Peskin and Berger 1999, Peskin 2002.
+double published(Kernel kernel, double r) {
+  r = std::abs(r);
+  switch (kernel) {
+    case Kernel::phi2:
+      return std::max(0.0, 1 - r);
+    case Kernel::phi3:
+      if (r <= 0.5) return (1 + std::sqrt(1 - 3 * r * r)) / 3;
+      return r < 1.5 ? (5 - 3 * r - std::sqrt(1 - 3 * (1 - r) * (1 - r))) / 6 : 0;
+    case Kernel::phi4:
+      if (r <= 1) return (3 - 2 * r + std::sqrt(1 + 4 * r - 4 * r * r)) / 8;
+      return r < 2 ? (5 - 2 * r - std::sqrt(-7 + 12 * r - 4 * r * r)) / 8 : 0;
+  }
+  return 0;
 }
 
 // Kernels keep the first moment, so torque is kept where all of a kernel is counted: what lies beyond a wall
 // at the nodes there. What is booked to the wall is a force without a place: taken at the wall's plane, where
 // the wall is, it lacks the lever from there to the nodes beyond. A force F along a wall at the distance d
-// then turns the fluid as if it acted at d + sum of phi(d - y_j) |y_j| over nodes y_j < 0.
+// then turns the fluid as if it acted at d + sum of phi(d - y_j) |y_j| over nodes y_j < 0. Of phi2 the only
+// node beyond counts up to d = 1/2, of phi3 up to 1, of phi4 two up to 3/2.
 TEST(Markers, TorqueAtAWallLacksTheLeverOfTheNodesBeyondIt) {
-  struct Distance {
-    double d, beyond, lever;  // dx; share of phi4 beyond the wall; missing lever, dx
-  };
-  const double half = (2 + std::sqrt(2)) / 8, far = (2 - std::sqrt(2)) / 8;  // phi4 at 1/2 and 3/2
-  for (const auto& [d, beyond, lever] : {Distance{0, 0.5, half * 0.5 + far * 1.5}, Distance{0.5, 0.25, 0.125},
-                                         Distance{1, far, far * 0.5}, Distance{1.5, 0, 0}})
-    for (const bool upper : {false, true}) {
-      Cloud cloud(1);
-      const double wall = upper ? block.ny : 0;
-      cloud.local[0] = {9.3, upper ? wall - d : d, 11.1, 0};
-      Markers<double> markers(block, Faces{}, Kernel::phi4, cloud.body);
-      markers.locate(cloud.origin.view(), cloud.local.view());
-      Array<Node4<double>> value(1), force(block.size());
-      value[0] = {0.3, -0.2, 1, 0};
-      markers.spread(value.view(), force.view());
-      const auto torque = [&](int from, int to) {  // about the x axis through the wall
-        double sum = 0;
-        for (int k = -3; k < block.nz + 3; ++k)
-          for (int j = from; j < to; ++j)
-            for (int i = -3; i < block.nx + 3; ++i) {
-              const auto f = force[block.at(i, j, k)];
-              sum += (j + .5 - wall) * f.z - (k + .5) * f.y;
-            }
-        return sum;
-      };
-      const double given = (cloud.local[0].y - wall) * value[0].z - cloud.local[0].z * value[0].y;
-      EXPECT_NEAR(torque(-3, block.ny + 3), given, 1e-13) << "of the whole kernel, at " << d;
-      const double fluid = torque(0, block.ny);
-      const auto impulse = fold_force_halo(block, Faces{}, force.view());
-      EXPECT_NEAR(impulse[upper][2], beyond * value[0].z, 1e-13) << d;
-      const double at_wall = -cloud.local[0].z * impulse[upper][1];
-      EXPECT_NEAR(fluid + at_wall - given, (upper ? -1 : 1) * lever * value[0].z, 1e-13) << d;
+  std::printf("kernel   d, dx   share beyond the wall   missing lever, dx\n");
+  for (const Kernel kernel : kernels)
+    for (const double d : {0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5}) {
+      double beyond = 0, lever = 0;
+      for (const double y : {0.5, 1.5}) {
+        beyond += published(kernel, d + y);
+        lever += published(kernel, d + y) * y;
+      }
+      std::printf("%s     %.2f    %.4f                  %.4f\n", name_of(kernel), d, beyond, lever);
+      for (const bool upper : {false, true}) {
+        Cloud cloud(1);
+        const double wall = upper ? block.ny : 0;
+        cloud.local[0] = {9.3, upper ? wall - d : d, 11.1, 0};
+        Markers<double> markers(block, Faces{}, kernel, cloud.body);
+        markers.locate(cloud.origin.view(), cloud.local.view());
+        Array<Node4<double>> value(1), force(block.size());
+        value[0] = {0.3, -0.2, 1, 0};
+        markers.spread(value.view(), force.view());
+        const auto torque = [&](int from, int to) {  // about the x axis through the wall
+          double sum = 0;
+          for (int k = -3; k < block.nz + 3; ++k)
+            for (int j = from; j < to; ++j)
+              for (int i = -3; i < block.nx + 3; ++i) {
+                const auto f = force[block.at(i, j, k)];
+                sum += (j + .5 - wall) * f.z - (k + .5) * f.y;
+              }
+          return sum;
+        };
+        const double given = (cloud.local[0].y - wall) * value[0].z - cloud.local[0].z * value[0].y;
+        const std::string where = name_of(kernel) + (" at " + std::to_string(d));
+        EXPECT_NEAR(torque(-3, block.ny + 3), given, 1e-13) << "of the whole kernel, " << where;
+        const double fluid = torque(0, block.ny);
+        const auto impulse = fold_force_halo(block, Faces{}, force.view());
+        EXPECT_NEAR(impulse[upper][2], beyond * value[0].z, 1e-13) << where;
+        const double at_wall = -cloud.local[0].z * impulse[upper][1];
+        EXPECT_NEAR(fluid + at_wall - given, (upper ? -1 : 1) * lever * value[0].z, 1e-13) << where;
+      }
     }
 }
 

@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
-#include <sstream>
 #include <string>
 
 #include "core/check.hpp"
+#include "support/environment.hpp"
 #include "support/figure.hpp"
 #include "support/red_cells.hpp"
 
@@ -238,20 +238,16 @@ TEST(RedCell, DragDoesNotKnowTheLattice) {
 // The elementary event of shear-induced diffusion: two cells that meet do not part as they came. What they
 // keep is a small difference of large displacements and depends on how they lie when they meet (with phi4
 // 0.08 um, with phi3 -0.02, of 0.66 um), so what the acceleration changes is measured by the largest
-// displacement. HEMOWALK_ACCELERATIONS="4 8 16" runs others.
+// displacement. HEMOWALK_ACCELERATIONS=4,8,16 runs others.
 TEST(PairCollision, PushesCellsApartAtAnyAcceleration) {
-  const char* asked = std::getenv("HEMOWALK_ACCELERATIONS");
   const char* partner = std::getenv("HEMOWALK_PARTNER");  // red_cell, platelet: only this one
-  std::istringstream list(asked ? asked : "32 50");
-  std::vector<double> accelerations;
-  for (double s = 0; list >> s;) accelerations.push_back(s);
   std::printf("partner, acceleration | net, peak displacement/um\n");
   for (const std::string name : {"red_cell", "platelet"}) {
     if (partner && name != partner) continue;
     std::vector<data::Kind> kinds{test::red_cell_kind(0.5)};
     if (name == "platelet") kinds.push_back(test::platelet_kind());
     std::optional<double> first;
-    for (const double s : accelerations) {
+    for (const double s : test::accelerations("32,50")) {
       const auto c = test::collide(kinds, s, 2.5);
       if (!first) first = c.net;
       std::printf("%s %.0f | %.5f %.5f\n", name.c_str(), s, c.net, c.peak);

@@ -4,28 +4,21 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <functional>
 #include <numeric>
 #include <random>
-#include <sstream>
 
 #include "core/statistics.hpp"
 #include "resolved/packing.hpp"
 #include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
 #include "support/blood_scene.hpp"
+#include "support/environment.hpp"
 
 namespace hemowalk::resolved {
 namespace {
 
-std::vector<double> accelerations() {
-  const char* chosen = std::getenv("HEMOWALK_ACCELERATIONS");
-  std::stringstream list(chosen ? chosen : "4,8,16,32");
-  std::vector<double> s;
-  for (std::string word; std::getline(list, word, ',');) s.push_back(std::atof(word.c_str()));
-  return s;
-}
+std::vector<double> accelerations() { return test::accelerations("4,8,16,32"); }
 
 data::Scene couette(const data::Vec3& size, double acceleration) {
   data::Scene scene = test::blood_scene(size, 0);

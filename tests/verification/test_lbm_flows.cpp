@@ -223,42 +223,65 @@ TEST(ShearWave, ViscosityIsTauMinusOneHalfOverThree) {
   }
 }
 
-/// Poiseuille flow in a tube of static solid: staircase walls, first order in 1/R.
-TEST(Tube, MeanVelocityConverges) {
-  std::vector<double> error;
-  for (const double radius : {5.3, 10.6, 21.2}) {
-    const int n = 2 * static_cast<int>(std::ceil(radius + 1));
-    const Block b{n, n, 1};
-    Parameters p;
-    p.tau = 1;
-    p.walls_y = false;
-    const double nu = (p.tau - 0.5) / 3;
-    p.body_force = {0, 0, 0.01 * 8 * nu / (radius * radius)};
-    Fluid<float> fluid(b, p);
-    const auto r2 = [&](double x, double y) { return (x - n / 2) * (x - n / 2) + (y - n / 2) * (y - n / 2); };
-    fluid.set_solid([&](int i, int j, int) { return r2(i + 0.5, j + 0.5) > radius * radius; });
-    fluid.initialise([&](double x, double y, double) {
-      return FlowPoint{1, {0, 0, p.body_force[2] / (4 * nu) * (radius * radius - r2(x, y))}};
-    });
-    const int steps = static_cast<int>(1.5 * radius * radius / nu);
-    for (int t = 0; t < steps; ++t) fluid.collide_and_stream({});
-    Field<float> u(b.size());
-    fluid.moments(u.view());
-    double flux = 0;
-    for_nodes(b, [&](int i, int j, int k) {
-      flux += u[b.at(i, j, k)].z + (fluid.is_solid(i, j, k) ? 0 : 0.5 * p.body_force[2]);
-      if (fluid.is_solid(i, j, k)) {
-        EXPECT_EQ(u[b.at(i, j, k)].z, 0);
-      }
-    });
-    // Hagen-Poiseuille: flux = pi R^4 g/(8 nu).
-    error.push_back(std::fabs(flux / (pi * std::pow(radius, 4) * p.body_force[2] / (8 * nu)) - 1));
-    const WallImpulse wall = fluid.wall_impulse();
-    EXPECT_NEAR(wall.solid[2] / (p.body_force[2] * static_cast<double>(fluid.fluid_nodes())), 1, 0.02);
+/// Flux in a tube of static solid over that of Hagen and Poiseuille for its radius (nodes), and for the
+/// circle that has the area of its fluid nodes.
+struct TubeFlux {
+  double of_radius, of_area;
+};
+TubeFlux tube_flux(double radius) {
+  const int n = 2 * static_cast<int>(std::ceil(radius + 1));
+  const Block b{n, n, 1};
+  Parameters p;
+  p.tau = 1;
+  p.walls_y = false;
+  const double nu = (p.tau - 0.5) / 3;
+  p.body_force = {0, 0, 0.01 * 8 * nu / (radius * radius)};
+  Fluid<float> fluid(b, p);
+  const auto r2 = [&](double x, double y) { return (x - n / 2) * (x - n / 2) + (y - n / 2) * (y - n / 2); };
+  fluid.set_solid([&](int i, int j, int) { return r2(i + 0.5, j + 0.5) > radius * radius; });
+  fluid.initialise([&](double x, double y, double) {
+    return FlowPoint{1, {0, 0, p.body_force[2] / (4 * nu) * (radius * radius - r2(x, y))}};
+  });
+  const int steps = static_cast<int>(1.5 * radius * radius / nu);
+  for (int t = 0; t < steps; ++t) fluid.collide_and_stream({});
+  Field<float> u(b.size());
+  fluid.moments(u.view());
+  double flux = 0;
+  for_nodes(b, [&](int i, int j, int k) {
+    flux += u[b.at(i, j, k)].z + (fluid.is_solid(i, j, k) ? 0 : 0.5 * p.body_force[2]);
+    if (fluid.is_solid(i, j, k)) {
+      EXPECT_EQ(u[b.at(i, j, k)].z, 0);
+    }
+  });
+  const WallImpulse wall = fluid.wall_impulse();
+  EXPECT_NEAR(wall.solid[2] / (p.body_force[2] * static_cast<double>(fluid.fluid_nodes())), 1, 0.02);
+  // Hagen-Poiseuille: flux = pi R^4 g/(8 nu).
+  const double unit = flux * 8 * nu / (pi * p.body_force[2]),
+               area = static_cast<double>(fluid.fluid_nodes()) / pi;
+  return {unit / std::pow(radius, 4), unit / (area * area)};
+}
+
+/// A staircase of nodes converges to first order. Where its steps lie jumps with the radius, so errors are
+/// root mean squares over eight radii in an octave. Against the tube with the area of the fluid's nodes the
+/// flux lacks 4 d/R: the staircase acts as a wall d = 0.065 nodes inside, whatever R. Against the nominal
+/// radius the number of nodes in the circle adds an error that falls faster (R^-1.4 as found in the circle
+/// problem), so over two octaves the order is 1 or more.
+TEST(Tube, FluxConvergesToFirstOrder) {
+  double of_radius[3], of_area[3];
+  for (int level = 0; level < 3; ++level) {
+    const double radius = 5.3 * (1 << level);
+    double sum[2] = {0, 0};
+    for (int i = 0; i < 8; ++i) {
+      const TubeFlux f = tube_flux(radius * std::pow(2, (i - 3.5) / 8));
+      sum[0] += std::pow(f.of_radius - 1, 2), sum[1] += std::pow(f.of_area - 1, 2);
+    }
+    of_radius[level] = std::sqrt(sum[0] / 8), of_area[level] = std::sqrt(sum[1] / 8);
+    std::printf("radius %.1f: rms error of the flux %.4f, of a tube of the nodes' area %.4f\n", radius,
+                of_radius[level], of_area[level]);
   }
-  EXPECT_LT(error[0], 2 * 1 / 5.3);  // a wall displaced by up to half a node changes R^4 by 2/R
-  EXPECT_LT(error[1], 2 * 1 / 10.6);
-  EXPECT_LT(error[2], 2 * 1 / 21.2);
+  EXPECT_NEAR(std::log2(of_area[0] / of_area[1]), 1, 0.2);
+  EXPECT_NEAR(std::log2(of_area[1] / of_area[2]), 1, 0.1);
+  EXPECT_GT(std::log2(of_radius[0] / of_radius[2]) / 2, 1);
 }
 
 /// Single precision holds mass because populations are stored as deviations: a flow at the paper's

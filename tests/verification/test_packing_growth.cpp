@@ -72,22 +72,26 @@ TEST(PackingGrowth, Hematocrit35) { expect_packed(0.35, 30, 6); }
 TEST(PackingGrowth, Hematocrit45) { expect_packed(0.45, 39, 7); }
 TEST(PackingGrowth, Hematocrit55) { expect_packed(0.55, 47, 9); }
 
-TEST(PackingGrowth, SameBitsForAnyNumberOfThreads) {
-  const data::Scene scene = test::blood_scene({16, 16, 16}, 0.3, 5);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = resolved::pack(scene);
-  omp_set_num_threads(3);
-  const auto three = resolved::pack(scene);
-  omp_set_num_threads(before);
-  ASSERT_EQ(one.size(), three.size());
-  for (std::size_t c = 0; c < one.size(); ++c) {
-    ASSERT_EQ(one[c].centre, three[c].centre);
-    ASSERT_EQ(one[c].orientation, three[c].orientation);
-    ASSERT_EQ(one[c].vertices, three[c].vertices);
+// The densest packing too: there cells touch from the first radius on, and one bit that differs is seen.
+TEST(PackingGrowth, SameBitsForAnyNumberOfThreadsAndOthersFromAnotherSeed) {
+  for (const double hematocrit : {0.3, 0.55}) {
+    const data::Scene scene = test::blood_scene({16, 16, 16}, hematocrit, 5);
+    const int before = omp_get_max_threads();
+    omp_set_num_threads(1);
+    const auto one = resolved::pack(scene);
+    omp_set_num_threads(3);
+    const auto three = resolved::pack(scene);
+    omp_set_num_threads(before);
+    const auto other = resolved::pack(test::blood_scene({16, 16, 16}, hematocrit, 6));
+    ASSERT_EQ(one.size(), three.size());
+    ASSERT_EQ(one.size(), other.size());
+    for (std::size_t c = 0; c < one.size(); ++c) {
+      ASSERT_EQ(one[c].centre, three[c].centre) << hematocrit;
+      ASSERT_EQ(one[c].orientation, three[c].orientation) << hematocrit;
+      ASSERT_EQ(one[c].vertices, three[c].vertices) << hematocrit;
+      EXPECT_NE(one[c].centre, other[c].centre) << hematocrit;
+    }
   }
-  const auto other = resolved::pack(test::blood_scene({16, 16, 16}, 0.3, 6));
-  EXPECT_NE(one[0].centre, other[0].centre);
 }
 
 // Sixty-four rigid ellipsoids in a dilute box: uniform on SO(3) means every entry of the rotation matrix has
