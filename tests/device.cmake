@@ -10,6 +10,9 @@ hemowalk_test(test_device_contact SOURCES unit/test_device_contact.cpp LINK hemo
               LABELS unit)
 hemowalk_test(test_device_simulation SOURCES verification/test_device_simulation.cpp LINK hemowalk_step
               LABELS verification)
+if(TARGET hemowalk_resolved)
+  hemowalk_test(test_device_bench SOURCES verification/test_device_bench.cpp LINK hemowalk_resolved LABELS verification)
+endif()
 if(TARGET hemowalk_coarse)
   hemowalk_test(test_device_walkers SOURCES unit/test_device_walkers.cpp LINK hemowalk_coarse LABELS unit)
 endif()
