@@ -31,6 +31,9 @@ target_compile_options(hemowalk_flags INTERFACE
 if(HEMOWALK_NATIVE)
   target_compile_options(hemowalk_flags INTERFACE
     $<$<COMPILE_LANGUAGE:CXX>:-march=native -mprefer-vector-width=512>)
+  # What the host makes of a kernel has the bits of the host's own code: the same instructions, fused ones included.
+  target_compile_options(hemowalk_flags INTERFACE
+    $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-march=native$<COMMA>-mprefer-vector-width=512>)
 endif()
 if(HEMOWALK_SANITIZE)
   target_compile_options(hemowalk_flags INTERFACE
@@ -42,7 +45,8 @@ target_link_libraries(hemowalk_flags INTERFACE OpenMP::OpenMP_CXX)
 if(HEMOWALK_CUDA)
   target_compile_definitions(hemowalk_flags INTERFACE HEMOWALK_CUDA=1)
   target_compile_options(hemowalk_flags INTERFACE
-    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -diag-suppress=554,1675 -Werror=cross-execution-space-call -Xcompiler=-fopenmp -Xcompiler=-Wall>)
+    $<$<COMPILE_LANGUAGE:CUDA>:--expt-relaxed-constexpr -diag-suppress=554,1675 -Werror=cross-execution-space-call -Xcompiler=-fopenmp -Xcompiler=-Wall
+      -Xcompiler=-fno-math-errno$<COMMA>-fno-trapping-math>)
   target_link_libraries(hemowalk_flags INTERFACE CUDA::cudart)
 endif()
 

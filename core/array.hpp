@@ -5,9 +5,11 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <string>
 #include <type_traits>
 #include <utility>
 
+#include "core/check.hpp"
 #include "core/device_choice.hpp"
 #include "core/portability.hpp"
 #include "core/view.hpp"
@@ -19,6 +21,16 @@
 #endif
 
 namespace hemowalk {
+
+#if defined(HEMOWALK_CUDA)
+namespace detail {
+inline void check(cudaError_t status, const char* what) {
+  if (status == cudaSuccess) return;
+  throw Error(Exit::internal, std::string(what) + " failed on the device (" + cudaGetErrorString(status) +
+                                  ") see whether the GPU has memory left, or use place: host");
+}
+}  // namespace detail
+#endif
 
 /// Owner of \p size trivially copyable elements, 64-byte aligned, zero-filled (in parallel: first touch).
 template <class T>
@@ -48,7 +60,12 @@ class Array {
 #if defined(HEMOWALK_CUDA)
       if (!use_device() || cudaMalloc(reinterpret_cast<void**>(&data_), bytes) != cudaSuccess)
         throw std::bad_alloc();
-      cudaMemset(data_, 0, bytes), cudaStreamSynchronize(nullptr);  // a Queue's stream does not wait for it
+      const cudaError_t cleared = cudaMemset(data_, 0, bytes);
+      const cudaError_t done = cudaStreamSynchronize(nullptr);  // a Queue's stream does not wait for it
+      if (cleared != cudaSuccess || done != cudaSuccess) {
+        cudaFree(data_);  // no destructor runs
+        detail::check(cleared, "clearing memory"), detail::check(done, "clearing memory");
+      }
 #else
       throw std::bad_alloc();  // built without CUDA: there is no device
 #endif
@@ -97,16 +114,22 @@ class Array {
   Place place_ = Place::host;
 };
 
-/// A copy of \p source at \p place.
+/// A copy of \p source at \p place, there when the call returns: the streams of Queues do not wait for
+/// others.
 template <class T>
-Array<T> copy_to(Place place, const Array<T>& source) {
+Array<T> place_copy(Place place, const Array<T>& source) {
   Array<T> result(source.size(), place);
   if (source.size() == 0) return result;
 #if defined(HEMOWALK_CUDA)
-  cudaMemcpy(result.data(), source.data(), source.size() * sizeof(T), cudaMemcpyDefault);
-#else
-  std::memcpy(result.data(), source.data(), source.size() * sizeof(T));
+  if (place == Place::device || source.place() == Place::device) {
+    detail::check(cudaMemcpy(result.data(), source.data(), source.size() * sizeof(T), cudaMemcpyDefault),
+                  "a copy");
+    // Not the whole device: another thread may be recording there.
+    detail::check(cudaStreamSynchronize(nullptr), "a copy");
+    return result;
+  }
 #endif
+  std::memcpy(static_cast<void*>(result.data()), source.data(), source.size() * sizeof(T));
   return result;
 }
 

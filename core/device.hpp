@@ -14,14 +14,14 @@
 /// So tests on a machine without a GPU run every kernel body. Two threads that meet within a phase would give
 /// a result that depends on their order: HostThreads turns the order round, and tests compare bits.
 ///
-/// A Queue records its work as a Graph (a CUDA graph; on the host a list of functors, copied by value as the
+/// A Queue records work as a Graph (a CUDA graph; on the host a list of functors, copied by value as the
 /// device does) and replays it. Files that call for_each() or blocks() belong under KERNELS in CMakeLists.
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <numeric>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -74,7 +74,8 @@ HEMO_HD inline void atomic_min(int* at, int value) {
 #endif
 }
 
-/// The order in which the host runs the threads of a block, for tests.
+/// The order in which the host runs the threads of a block, for tests; blocks run in turn, but for forward
+/// from the last to the first.
 enum class HostThreads { forward, backward, scattered };
 inline HostThreads& host_threads() {
   static HostThreads order = HostThreads::forward;
@@ -105,7 +106,8 @@ void run_blocks(unsigned blocks, std::size_t shared_bytes, const Body& body) {
     std::vector<Line> lines(shared_bytes / 64 + 1);
     unsigned char* shared = lines[0].byte;
 #pragma omp for schedule(static)
-    for (unsigned block = 0; block < blocks; ++block) {
+    for (unsigned b = 0; b < blocks; ++b) {
+      const unsigned block = order == HostThreads::forward ? b : blocks - 1 - b;
       // Shared memory holds rubbish at the start, as on the device: NaN in every precision.
       if (order != HostThreads::forward) std::memset(static_cast<void*>(shared), 0xff, lines.size() * 64);
       const int phases = body.phases();
@@ -123,14 +125,6 @@ void run_each(std::size_t n, const Body& body) {
     body(static_cast<std::size_t>(forward ? i : static_cast<std::ptrdiff_t>(n) - 1 - i));
 }
 
-#if defined(HEMOWALK_CUDA)
-inline void check(cudaError_t status, const char* what) {
-  if (status == cudaSuccess) return;
-  throw Error(Exit::internal, std::string(what) + " failed on the device (" + cudaGetErrorString(status) +
-                                  ") see whether the GPU has memory left, or use place: host");
-}
-#endif
-
 #if defined(__CUDACC__)
 template <class Body>
 __global__ void __launch_bounds__(256) each_kernel(std::size_t n, Body body) {
@@ -139,7 +133,7 @@ __global__ void __launch_bounds__(256) each_kernel(std::size_t n, Body body) {
 }
 template <class Body>
 __global__ void __launch_bounds__(Body::threads) block_kernel(Body body) {
-  extern __shared__ __align__(16) unsigned char shared[];
+  extern __shared__ __align__(32) unsigned char shared[];  // 32: Node4<double>
   const BlockThread at{blockIdx.x, threadIdx.x};
   const int phases = body.phases();
   for (int phase = 0; phase < phases; ++phase) {
@@ -191,6 +185,34 @@ class Pinned {
   const void* data_ = nullptr;
 };
 
+/// An array of the host, pinned as one for \p place: anew only where it grows.
+template <class T>
+class PinnedArray {
+ public:
+  explicit PinnedArray(Place place, std::size_t size = 0) : place_(place) { fit(size); }
+  /// As Queue::fit; no copy may be under way.
+  void fit(std::size_t n) {
+    if (n <= array_.size()) return;
+    Array<T> larger(array_.size() == 0 ? n : n + n / 4);
+    std::copy(array_.begin(), array_.end(), larger.begin());
+    pin_.reset();  // before memory goes
+    array_ = std::move(larger);
+    pin_.emplace(place_, array_.data(), array_.size() * sizeof(T));
+  }
+  std::size_t size() const { return array_.size(); }
+  T* data() { return array_.data(); }
+  const T* data() const { return array_.data(); }
+  T& operator[](std::size_t i) { return array_[i]; }
+  const T& operator[](std::size_t i) const { return array_[i]; }
+  View<T> view() { return array_.view(); }
+  View<const T> view() const { return array_.view(); }
+
+ private:
+  Place place_;
+  Array<T> array_;
+  std::optional<Pinned> pin_;
+};
+
 /// Recorded work, to be replayed by Queue::replay with one launch.
 class Graph {
  public:
@@ -227,6 +249,25 @@ class Queue {
   }
 
   Place place() const { return place_; }
+
+  /// \throws InputError where a block has less shared memory than \p bytes: known before work is recorded.
+  /// The host has as much as the devices that have most.
+  void require_shared_memory(std::size_t bytes) const {
+    int most = 227 * 1024;
+#if defined(HEMOWALK_CUDA)
+    enter();
+    if (place_ == Place::device) {
+      int device = 0;
+      detail::check(cudaGetDevice(&device), "asking for the device");
+      detail::check(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device),
+                    "asking for its shared memory");
+    }
+#endif
+    require(bytes <= static_cast<std::size_t>(most),
+            "a cell does not fit into this device (its block of threads needs " + std::to_string(bytes) +
+                " bytes of shared memory, there are " + std::to_string(most) +
+                ") use fluid.precision: single, a lower subdivision, or place: host");
+  }
 
   /// body(i) for i in [0, n), in any order.
   template <class Body>
@@ -305,35 +346,26 @@ class Queue {
 #endif
   }
 
-  /// From here to end_recording() work is kept instead of done.
-  void begin_recording() {
-    enter();
-    recording_ = true;
-    enqueued_ = 0;
-    work_.clear();
+  /// What \p work enqueues is kept instead of done. When it throws, nothing is kept and the queue goes on.
+  template <class Work>
+  Graph record(const Work& work) {
+    begin_recording();
+    try {
+      work();
+    } catch (...) {
+      recording_ = false;
+      work_.clear();
 #if defined(HEMOWALK_CUDA)
-    if (place_ == Place::device)
-      detail::check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "recording a graph");
+      if (place_ == Place::device) {
+        cudaGraph_t dropped = nullptr;
+        cudaStreamEndCapture(stream_, &dropped);
+        if (dropped) cudaGraphDestroy(dropped);
+        (void)cudaGetLastError();  // what went wrong is on its way up
+      }
 #endif
-  }
-  Graph end_recording() {
-    Graph graph;
-    graph.size_ = enqueued_;
-    graph.work_ = std::move(work_);
-    work_.clear();
-    recording_ = false;
-#if defined(HEMOWALK_CUDA)
-    if (place_ == Place::device) {
-      cudaGraph_t captured = nullptr;
-      cudaGraphExec_t executable = nullptr;
-      detail::check(cudaStreamEndCapture(stream_, &captured), "recording a graph");
-      detail::check(cudaGraphInstantiate(&executable, captured, 0), "building a graph");
-      cudaGraphDestroy(captured);
-      graph.executable_ = std::shared_ptr<void>(
-          executable, [](void* e) { cudaGraphExecDestroy(static_cast<cudaGraphExec_t>(e)); });
+      throw;
     }
-#endif
-    return graph;
+    return end_recording();
   }
   void replay(const Graph& graph) {
     enter();
@@ -385,6 +417,36 @@ class Queue {
   }
 
  private:
+  void begin_recording() {
+    enter();
+    recording_ = true;
+    enqueued_ = 0;
+    work_.clear();
+#if defined(HEMOWALK_CUDA)
+    if (place_ == Place::device)
+      detail::check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal), "recording a graph");
+#endif
+  }
+  Graph end_recording() {
+    Graph graph;
+    graph.size_ = enqueued_;
+    graph.work_ = std::move(work_);
+    work_.clear();
+    recording_ = false;
+#if defined(HEMOWALK_CUDA)
+    if (place_ == Place::device) {
+      cudaGraph_t captured = nullptr;
+      cudaGraphExec_t executable = nullptr;
+      detail::check(cudaStreamEndCapture(stream_, &captured), "recording a graph");
+      const cudaError_t built = cudaGraphInstantiate(&executable, captured, 0);
+      cudaGraphDestroy(captured);
+      detail::check(built, "building a graph");
+      graph.executable_ = std::shared_ptr<void>(
+          executable, [](void* e) { cudaGraphExecDestroy(static_cast<cudaGraphExec_t>(e)); });
+    }
+#endif
+    return graph;
+  }
   /// The calling thread's current device may be another one.
   void enter() const {
     if (place_ == Place::device) require(use_device(), no_device);
@@ -405,22 +467,6 @@ class Queue {
   cudaStream_t stream_ = nullptr;
 #endif
 };
-
-/// A copy of \p source at \p place, there when the call returns: the streams of Queues do not wait for
-/// others.
-template <class T>
-Array<T> place_copy(Place place, const Array<T>& source) {
-  if (place == Place::host && source.place() == Place::host) {  // also where the CUDA library finds no driver
-    Array<T> copy(source.size());
-    if (source.size()) std::memcpy(static_cast<void*>(copy.data()), source.data(), source.size() * sizeof(T));
-    return copy;
-  }
-  Array<T> copy = copy_to(place, source);
-#if defined(HEMOWALK_CUDA)
-  if (place == Place::device) detail::check(cudaDeviceSynchronize(), "a copy to the device");
-#endif
-  return copy;
-}
 
 /// An array at \p place with the values of \p source.
 template <class T>

@@ -11,8 +11,10 @@
 #include "core/ceilings.hpp"
 #include "core/check.hpp"
 #include "core/statistics.hpp"
+#include "resolved/device_simulation.hpp"
 #include "resolved/packing.hpp"
 #include "resolved/resolve.hpp"
+#include "resolved/stepper.hpp"
 
 namespace hemowalk::resolved {
 
@@ -89,6 +91,17 @@ Timings least_times(const Ceilings& ceilings, double nodes, double markers) {
   return least;
 }
 
+/// Parts of a step on a device, s per fluid step.
+template <class Real>
+Timings device_parts(DeviceSimulation<Real>& device, int steps, int every, bool one_rank) {
+  const double unknown = std::nan("");
+  Timings parts{unknown, unknown, unknown, unknown, unknown, unknown, unknown, 0};
+  if (!one_rank) return parts;
+  const PartTimes t = device.time_parts(steps);
+  return {t.fluid / every, (t.locate + t.interpolation) / every, t.spreading / every, t.solid / every,
+          t.contact / every};
+}
+
 template <class Real>
 BenchReport run(const Scene& scene, const BenchOptions& options) {
   const auto say = [&](double fraction, const std::string& what) {
@@ -113,7 +126,10 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   report.threads = omp_get_max_threads();
   report.simulated_per_step = simulation.units().to_time(1);
   report.bytes_per_node = lbm::Fluid<Real>::bytes_per_node_advance();
-  for (int i = 0; i < options.warm_up; ++i) simulation.step();
+  Stepper<Real> stepper(simulation, options.device);
+  DeviceSimulation<Real>* device = stepper.whole();
+  for (int i = 0; i < options.warm_up; ++i) stepper.step();
+  stepper.sync();
 
   using Part = double Timings::*;
   constexpr std::array<Part, 7> parts{&Timings::fluid, &Timings::interpolation, &Timings::spreading,
@@ -123,21 +139,27 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   std::array<std::vector<double>, parts.size()> times;
   std::vector<double> whole;
   const auto start = simulation.momentum();
-  for (int i = 0; i < options.steps; ++i) {
+  // A device is not waited for after each step.
+  const int round = device ? std::min(10, options.steps) : 1, rounds = options.steps / round;
+  for (int i = 0; i < rounds; ++i) {
     simulation.timings() = {};
     const double began = omp_get_wtime();
-    simulation.step();
-    whole.push_back((omp_get_wtime() - began) / every);
+    for (int s = 0; s < round; ++s) stepper.step();
+    stepper.wait();
+    whole.push_back((omp_get_wtime() - began) / round / every);
     for (std::size_t p = 0; p < parts.size(); ++p) times[p].push_back(simulation.timings().*parts[p] / every);
-    say(static_cast<double>(i + 1) / options.steps, fmt::format("{:.1f} ms per step", 1e3 * whole.back()));
+    say(static_cast<double>(i + 1) / rounds, fmt::format("{:.1f} ms per step", 1e3 * whole.back()));
   }
+  stepper.sync();
   const auto end = simulation.momentum();
   for (int d = 0; d < 3 && end.scale() > 0; ++d)
     report.momentum_residual =
         std::max(report.momentum_residual, std::abs(end.total()[d] - start.total()[d]) / end.scale());
   report.memory = sum(resident_memory());
   for (std::size_t p = 0; p < parts.size(); ++p) report.parts.*parts[p] = median(times[p]);
-  report.parts.steps = static_cast<std::int64_t>(options.steps) * every;
+  if (device)
+    report.parts = device_parts(*device, std::max(2, options.steps / 8), every, options.ranks.count() == 1);
+  report.parts.steps = static_cast<std::int64_t>(rounds) * round * every;
   report.step.median = median(whole), report.step.min = *std::min_element(whole.begin(), whole.end());
   for (const double t : whole) report.step.mean += t / static_cast<double>(whole.size());
   for (auto& t : whole) t = std::abs(t - report.step.median);
@@ -147,6 +169,7 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
   const Ceilings ceilings{std::max(before.bandwidth, sum(memory_bandwidth())),
                           std::max(before.fma, sum(fma_rate<Real>()))};
   report.bandwidth = ceilings.bandwidth, report.fma = ceilings.fma;
+  if (device) return report;
   report.least =
       least_times<Real>(ceilings, static_cast<double>(report.nodes), static_cast<double>(report.markers));
   return report;
@@ -156,6 +179,7 @@ BenchReport run(const Scene& scene, const BenchOptions& options) {
 
 BenchReport bench(const Scene& scene, const BenchOptions& options) {
   require(options.steps > 0, "steps is not positive (there is nothing to time) use --steps 50");
+  require(scene.place.solid == Place::host || options.device == Place::host || device_present(), no_device);
   std::string problems;
   for (const auto& p : preflight(scene)) problems += (problems.empty() ? "" : "\n") + p;
   require(problems.empty(), problems);

@@ -68,10 +68,14 @@ DeviceBorder<Real>::DeviceBorder(Queue& queue, const Decomposition& decompositio
       copies_(decomposition, contact_range, vertices, MarkersOfCopies::shared),
       vertices_(std::move(vertices)),
       populations_(decomposition, Topic::populations),
-      outgoing_(2 * border_size),
-      incoming_(2 * border_size) {
-  pin();
-}
+      outgoing_(queue.place(), 2 * border_size),
+      incoming_(queue.place(), 2 * border_size),
+      origin_(queue.place()),
+      extent_(queue.place()),
+      vertex_(queue.place()),
+      site_(queue.place()),
+      value_(queue.place()),
+      packed_(queue.place()) {}
 
 template <class Real>
 void DeviceBorder<Real>::set_bodies(const std::vector<std::uint16_t>& shapes) {
@@ -104,21 +108,9 @@ void DeviceBorder<Real>::list_slots() {
   queue_.fit(listed_there_, listed_.size());
   queue_.upload(listed_there_, listed_);
   queue_.fit(packed_there_, 2 * listed_.size());
-  pinned_.clear();  // before memory moves
-  Queue host(Place::host);
-  host.fit(origin_, copies_.bodies().size()), host.fit(extent_, bodies_);
-  for (auto* field : {&vertex_, &site_, &value_}) host.fit(*field, copies_.slots());
-  host.fit(packed_, 2 * listed_.size());
-  pin();
-}
-
-template <class Real>
-void DeviceBorder<Real>::pin() {
-  const auto hold = [&](const auto& array) {
-    pinned_.emplace_back(queue_.place(), array.data(), array.size() * sizeof(array[0]));
-  };
-  hold(outgoing_), hold(incoming_), hold(origin_), hold(extent_), hold(packed_);
-  hold(vertex_), hold(site_), hold(value_);
+  origin_.fit(copies_.bodies().size()), extent_.fit(bodies_);
+  for (auto* field : {&vertex_, &site_, &value_}) field->fit(copies_.slots());
+  packed_.fit(2 * listed_.size());
 }
 
 template <class Real>

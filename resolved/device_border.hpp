@@ -65,7 +65,6 @@ class DeviceBorder {
 
  private:
   void list_slots();
-  void pin();
   std::size_t copied_slots() const { return copies_.slots() - slots_; }
 
   Queue& queue_;
@@ -74,13 +73,12 @@ class DeviceBorder {
   Ring populations_;
   std::size_t bodies_ = 0, slots_ = 0;  ///< own
   // On the host.
-  Array<Real> outgoing_, incoming_;
-  Array<ibm::Origin> origin_;                 ///< [body]
-  Array<Extent> extent_;                      ///< [own body]
-  Array<Node4<Real>> vertex_, site_, value_;  ///< [slot]
-  Array<Node4<Real>> packed_;                 ///< two values per listed slot
-  std::vector<std::uint32_t> listed_;         ///< own slots that a neighbour has copies of
-  std::vector<Pinned> pinned_;
+  PinnedArray<Real> outgoing_, incoming_;
+  PinnedArray<ibm::Origin> origin_;                 ///< [body]
+  PinnedArray<Extent> extent_;                      ///< [own body]
+  PinnedArray<Node4<Real>> vertex_, site_, value_;  ///< [slot]
+  PinnedArray<Node4<Real>> packed_;                 ///< two values per listed slot
+  std::vector<std::uint32_t> listed_;               ///< own slots that a neighbour has copies of
   // At the queue's place.
   Array<std::uint32_t> listed_there_, first_there_;  ///< the latter: [own body + 1] first slot
   Array<Extent> extent_there_;

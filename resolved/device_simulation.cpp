@@ -11,20 +11,6 @@
 
 namespace hemowalk::resolved {
 
-namespace {
-
-/// On a divided domain each rank reads its own nodes alone: the halo of other ranks holds nothing.
-template <class Real>
-Array<Node4<Real>> without_neighbours(const Block& block, const Array<Node4<Real>>& field, bool divided) {
-  auto own = place_copy(Place::host, field);
-  const std::size_t halo = divided ? Block::halo * block.plane() : 0;
-  std::fill(own.begin(), own.begin() + halo, Node4<Real>{0, 0, 0, 0});
-  std::fill(own.end() - halo, own.end(), Node4<Real>{0, 0, 0, 0});
-  return own;
-}
-
-}  // namespace
-
 template <class Real>
 DeviceSimulation<Real>::DeviceSimulation(Queue& queue, Simulation<Real>& host)
     : queue_(queue),
@@ -35,8 +21,7 @@ DeviceSimulation<Real>::DeviceSimulation(Queue& queue, Simulation<Real>& host)
       share_(static_cast<Real>(0.5 * scene_.coupling.theta_n)),
       any_cells_(host.any_cells_),
       fluid_(queue, host.fluid()),
-      velocity_(place_copy(queue.place(),
-                           without_neighbours(block_, host.velocity_, host.decomposition().divided()))),
+      velocity_(host.velocity_.size(), queue.place()),
       force_(place_copy(queue.place(), host.force_)),
       fluid_steps_(host.fluid_steps()),
       first_step_(host.fluid_steps()),
@@ -48,15 +33,30 @@ DeviceSimulation<Real>::DeviceSimulation(Queue& queue, Simulation<Real>& host)
           "value, or use place: host");
   graphs_.resize(2 * (first_fluid_segment + 2 * static_cast<std::size_t>(scene_.coupling.solid_every)));
   if (any_cells_) build_groups(host);
-  if (!host.decomposition().divided()) return;
-  if (!border_)
-    border_ = std::make_unique<DeviceBorder<Real>>(queue_, host.decomposition(), -1, std::vector<int>{},
-                                                   fluid_.border_size());
-  if (!fluid_.odd()) return;
-  fluid_.send_borders(border_->outgoing());
-  border_->exchange_populations();
-  fluid_.receive_borders(border_->incoming());
+  if (host.decomposition().divided()) {
+    if (!border_)
+      border_ = std::make_unique<DeviceBorder<Real>>(queue_, host.decomposition(), -1, std::vector<int>{},
+                                                     fluid_.border_size());
+    if (fluid_.odd()) {
+      fluid_.send_borders(border_->outgoing());
+      border_->exchange_populations();
+      fluid_.receive_borders(border_->incoming());
+    }
+  }
+  // Not the host's velocity: a step leaves what this kernel makes of the populations, to the last bit.
+  fluid_.moments(force(), velocity_.data(), share_);
+  queue_.wait();
 }
+
+namespace {
+
+/// Shared memory of a CoupledStep's block.
+template <class Real, class Cells>
+std::size_t coupled_bytes(const Cells& cells) {
+  return std::max(cells.shared_bytes(), CellCoupling<Real>::shared_bytes(cells.vertices()));
+}
+
+}  // namespace
 
 /// What does not change when cells come and go.
 template <class Real>
@@ -119,6 +119,8 @@ void DeviceSimulation<Real>::build_groups(const Simulation<Real>& host) {
                        group.surface,
                        CellCoupling<Real>{},
                        {}});
+    std::visit([&](const auto& cells) { queue_.require_shared_memory(coupled_bytes<Real>(cells)); },
+               groups_.back().cells);
   }
   const contact::Law law = make_contact(scene_, host.units());
   contact::Domain domain = make_domain(scene_, block_);
@@ -191,7 +193,8 @@ void DeviceSimulation<Real>::assign_bodies(const Simulation<Real>& host) {
   markers_->assign(body_of);
   contact_->assign(shape_of, bodies_, load);
   connect();
-  for (Graph& graph : graphs_) graph = {};
+  // Of the fluid nothing has moved.
+  for (std::size_t g = 0; g < 2 * first_fluid_segment; ++g) graphs_[g] = {};
 }
 
 /// Where everything lies now.
@@ -269,9 +272,7 @@ void DeviceSimulation<Real>::move_cells() {
     std::visit(
         [&](const auto& cells) {
           using Solid = typename std::decay_t<decltype(cells)>::Step;
-          const std::size_t shared =
-              std::max(cells.shared_bytes(), CellCoupling<Real>::shared_bytes(cells.vertices()));
-          queue_.blocks(static_cast<std::size_t>(cells.count()), shared,
+          queue_.blocks(static_cast<std::size_t>(cells.count()), coupled_bytes<Real>(cells),
                         CoupledStep<Real, Solid>{group.coupling, cells.body(options)});
         },
         group.cells);
@@ -304,9 +305,7 @@ template <class Work>
 void DeviceSimulation<Real>::run(std::size_t segment, int fluid_steps, const Work& work) {
   Graph& graph = graphs_[2 * segment + fluid_.odd()];
   if (graph.empty()) {
-    queue_.begin_recording();
-    work();
-    graph = queue_.end_recording();
+    graph = queue_.record(work);
   } else {
     fluid_.replayed(fluid_steps);
   }

@@ -79,6 +79,16 @@ void Stepper<Real>::sync() {
 }
 
 template <class Real>
+void Stepper<Real>::wait() {
+  impl_->queue.wait();
+}
+
+template <class Real>
+DeviceSimulation<Real>* Stepper<Real>::whole() {
+  return impl_->whole.get();
+}
+
+template <class Real>
 std::int64_t Stepper<Real>::fluid_steps() const {
   return impl_->whole ? impl_->whole->fluid_steps() : impl_->simulation.fluid_steps();
 }

@@ -12,6 +12,9 @@
 
 namespace hemowalk::resolved {
 
+template <class Real>
+class DeviceSimulation;
+
 /// Why these places do not go together, or nothing.
 std::string place_problem(const data::Scene& scene);
 
@@ -29,6 +32,10 @@ class Stepper {
   void step(EnergyBudget* budget = nullptr);
   /// Brings the Simulation up to date (all).
   void sync();
+  /// Returns when the device has done what was asked for, for timing.
+  void wait();
+  /// The whole step on the device; null where some of it is on the host.
+  DeviceSimulation<Real>* whole();
   std::int64_t fluid_steps() const;
 
  private:

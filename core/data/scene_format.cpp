@@ -268,7 +268,8 @@ const Field& scene_format() {
       with_default("cells", cells(), "{}", "the cells"),
       with_default("time", time(), "{}", "how long, and what is kept"),
       with_default("seed", integer().at_least(0), "1", "of all random numbers"),
-      with_default("place", places(), "{}", "host or device, per part"),
+      with_default("place", places(), "{}",
+                   "host or device, per part: all three on one place, or the solid alone on the device"),
   });
   return format;
 }

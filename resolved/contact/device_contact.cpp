@@ -1,5 +1,6 @@
 #include "resolved/contact/device_contact.hpp"
 
+#include <cmath>
 #include <string>
 
 #include "core/check.hpp"
@@ -18,6 +19,8 @@ DeviceContact<Real>::DeviceContact(Queue& queue, const Law& law, const Domain& d
             "the box is too small for contact on the device (a period below 16 dx: a vertex could meet two "
             "images of a "
             "triangle) use place: host");
+  require(domain.walls.geometry != Walls::Geometry::surface,
+          "walls from a surface are not on the device (their distance lies on the host) use place: host");
   const Place place = queue.place();
   std::vector<Triangle3> triangles;
   std::vector<std::uint32_t> ring_begin, ring;
@@ -127,7 +130,11 @@ Summary DeviceContact<Real>::summary() const {
                        std::to_string(capacity_) +
                        ") cells have collapsed onto each other, or give "
                        "the lists more room");
+  if (t.longest_edge_squared() > torn_edge * torn_edge)
+    throw PhysicsError("contact: a cell's edge is " + std::to_string(std::sqrt(t.longest_edge_squared())) +
+                       " dx long (blow-up) lower the acceleration or raise coupling.iterations");
   Summary s;
+  if (slots_ == 0) return s;  // nobody has pressed since: the sums are of an earlier step
   if (unordered(t.gap) < 1e30f) s.minimum_gap = static_cast<double>(unordered(t.gap));
   if (unordered(t.wall_gap) < 1e30f) s.minimum_wall_gap = static_cast<double>(unordered(t.wall_gap));
   s.contacts = t.contacts, s.wall_contacts = t.wall_contacts;
@@ -143,7 +150,8 @@ std::array<std::array<double, 3>, 2> DeviceContact<Real>::wall_impulse() const {
   const Tally t = tally();
   std::array<std::array<double, 3>, 2> sum{};
   for (std::size_t w = 0; w < 2; ++w)
-    for (std::size_t d = 0; d < 3; ++d) sum[w][d] = force_grain * static_cast<double>(t.wall_total[w][d]);
+    for (std::size_t d = 0; d < 3; ++d)
+      sum[w][d] = t.wall_before[w][d] + force_grain * static_cast<double>(t.wall_force[w][d]);
   return sum;
 }
 

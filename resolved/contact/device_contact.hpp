@@ -12,7 +12,7 @@ class DeviceContact {
  public:
   /// Bodies in order; the vertices of body b are slots first[b] .. and follow each other.
   /// \p load: [slot][3] constant forces that are added, or empty. \p capacity: triangles a vertex's list
-  /// holds. \throws InputError for a period below 16 dx.
+  /// holds. \throws InputError for a period below 16 dx and for walls from a surface.
   DeviceContact(Queue& queue, const Law& law, const Domain& domain, const std::vector<Shape>& shapes,
                 const std::vector<std::uint16_t>& shape_of,
                 const std::vector<std::array<double, 3>>& load = {}, int capacity = 48);
@@ -29,7 +29,8 @@ class DeviceContact {
   const std::int64_t* forces() const { return force_.data(); }
   std::uint32_t slots() const { return slots_; }
 
-  /// Of the last compute(); waits. \throws PhysicsError if a list was too short: forces were left out.
+  /// Of the last compute(); waits. \throws PhysicsError if a list was too short or a cell is torn: forces
+  /// were left out.
   Summary summary() const;
   /// Impulse on the walls since the start, for one step per compute(); waits.
   std::array<std::array<double, 3>, 2> wall_impulse() const;

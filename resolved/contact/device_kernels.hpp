@@ -44,18 +44,6 @@ struct Near {
   std::uint32_t triangle;
 };
 
-/// Sums over all contacts; integers, so that any order will do.
-struct Tally {
-  std::int64_t wall_force[2][3];  ///< grains, of this step
-  std::int64_t wall_total[2][3];  ///< grains, since the start
-  std::int64_t energy;            ///< grains
-  unsigned contacts, wall_contacts;
-  int gap, wall_gap;  ///< smallest, as ordered bits
-  unsigned searches;
-  int overflow;      ///< minus the length of the longest list that did not fit; 0 = all fit
-  int largest_edge;  ///< minus its square as ordered bits, while a search is on
-};
-
 /// An integer that orders like the float.
 HEMO_HD inline int ordered(float f) {
   int bits;
@@ -68,6 +56,24 @@ HEMO_HD inline float unordered(int bits) {
   std::memcpy(&f, &bits, sizeof f);
   return f;
 }
+
+/// Sums over all contacts; integers, so that any order will do.
+struct Tally {
+  std::int64_t wall_force[2][3];  ///< grains, of this step
+  double wall_before[2][3];       ///< sum of the steps before it: in grains it would overflow
+  std::int64_t energy;            ///< grains
+  unsigned contacts, wall_contacts;
+  int gap, wall_gap;  ///< smallest, as ordered bits
+  unsigned searches;
+  int overflow;      ///< minus the length of the longest list that did not fit; 0 = all fit
+  int largest_edge;  ///< minus its square as ordered bits, while a search is on or when cells are torn
+
+  HEMO_HD double longest_edge_squared() const { return static_cast<double>(unordered(-largest_edge)); }
+};
+
+/// Longest edge of a triangle, dx, that is searched for: half the smallest period that is allowed. Cells with
+/// a longer one are torn: no physics is left, and each vertex would look at all others.
+inline constexpr double torn_edge = 8;
 
 /// What all kernels of contact see: bodies, their vertices, and lists. Slots are vertices of all bodies; a
 /// body's vertices follow each other.
@@ -129,7 +135,10 @@ struct StartForces {
     if (i == 0) {
       Tally& t = *s.tally;
       for (int w = 0; w < 2; ++w)
-        for (int d = 0; d < 3; ++d) t.wall_force[w][d] = 0;
+        for (int d = 0; d < 3; ++d) {
+          t.wall_before[w][d] += force_grain * static_cast<double>(t.wall_force[w][d]);
+          t.wall_force[w][d] = 0;
+        }
       t.energy = 0, t.contacts = 0, t.wall_contacts = 0;
       t.gap = ordered(1e30f), t.wall_gap = ordered(1e30f);
     }
@@ -188,12 +197,16 @@ struct FindNear {
   Crowd<Real> s;
   BinView bins;
 
+  /// Cells that blow up may be anywhere.
+  HEMO_HD static int node(double x) {
+    return static_cast<int>(std::floor(std::fmin(std::fmax(x, -1e9), 1e9)));
+  }
   /// Nodes of an axis to look at: one or two stretches within [lowest, n).
   struct Stretches {
     int first[2], last[2], count;
   };
   HEMO_HD static Stretches stretches(double low, double high, int n, bool periodic, int edge) {
-    int lo = static_cast<int>(std::floor(low)), hi = static_cast<int>(std::floor(high));
+    int lo = node(low), hi = node(high);
     if (!periodic) return {{lo > -1 ? lo : -1, 0}, {hi < n - 1 ? hi : n - 1, 0}, 1};
     if (hi - lo + 1 + 2 * edge >= n) return {{0, 0}, {n - 1, 0}, 1};
     const int around = static_cast<int>(std::floor(static_cast<double>(lo) / n)) * n;
@@ -206,8 +219,8 @@ struct FindNear {
   /// outermost ones.
   HEMO_HD Stretches along_divided_z(double low, double high) const {
     const int last = bins.block.nz + 2 * bins.beyond - 1;
-    const auto clamp = [last, this](double node) {
-      const int k = static_cast<int>(std::floor(node)) + bins.beyond;
+    const auto clamp = [last, this](double z) {
+      const int k = node(z) + bins.beyond;
       return k < 0 ? 0 : k > last ? last : k;
     };
     return {{clamp(low), 0}, {clamp(high), 0}, 1};
@@ -220,7 +233,11 @@ struct FindNear {
     s.reference[me] = s.local[me];
     s.reference_origin[me] = s.origin[b];
     const Point<Real> p = s.point(me);
-    const double edge2 = static_cast<double>(unordered(-s.tally->largest_edge));
+    const double edge2 = s.tally->longest_edge_squared();
+    if (edge2 > torn_edge * torn_edge) {
+      s.count[me] = 0;
+      return;
+    }
     const double within = static_cast<double>(s.reach()) + s.law.skin,
                  radius = std::sqrt(within * within + edge2 / 3) + 1e-3;
     const double reach = radius + bins.slack + 0.5;
@@ -316,7 +333,7 @@ struct PressVertices {
     const auto me = static_cast<std::uint32_t>(index);
     if (me == 0 && *s.stale != 0) {
       *s.stale = 0;
-      s.tally->largest_edge = 0;
+      if (s.tally->longest_edge_squared() <= torn_edge * torn_edge) s.tally->largest_edge = 0;
       ++s.tally->searches;
     }
     press_wall(me);
@@ -399,8 +416,7 @@ struct PressVertices {
                                to_grains(static_cast<double>(push.z))};
     add(me, f);
     Tally& t = *s.tally;
-    for (int d = 0; d < 3; ++d)
-      atomic_add(&t.wall_force[wall.wall][d], -f[d]), atomic_add(&t.wall_total[wall.wall][d], -f[d]);
+    for (int d = 0; d < 3; ++d) atomic_add(&t.wall_force[wall.wall][d], -f[d]);
     atomic_add(&t.energy, to_grains(static_cast<double>(potential.energy(wall.gap))));
     atomic_add(&t.wall_contacts, 1u);
     atomic_min(&t.wall_gap, ordered(static_cast<float>(wall.gap)));

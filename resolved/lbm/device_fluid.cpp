@@ -198,7 +198,7 @@ void DeviceFluid<Real>::moments(const Node4<Real>* force, Node4<Real>* velocity,
     return Node4<Real>{static_cast<Real>(u[0]), static_cast<Real>(u[1]), static_cast<Real>(u[2]), Real(0)};
   };
   queue_.for_each(FillWallHalo<Real>::count(block_),
-                  FillWallHalo<Real>{block_, wall(parameters_.lower_wall_velocity),
+                  FillWallHalo<Real>{block_, parameters_.divided_z, wall(parameters_.lower_wall_velocity),
                                      wall(parameters_.upper_wall_velocity), velocity});
 }
 

@@ -34,7 +34,9 @@ class DeviceFluid {
   /// Enqueues one step: collision with \p force (with halo; null: body force only), streaming, and velocity =
   /// u* + \p share F of the new state, with the periodic halo. Place of both fields: the queue's.
   void advance(const Node4<Real>* force, Node4<Real>* velocity, Real share);
-  /// Enqueues velocity = u* + share F of the present state, and the walls' velocities beyond the walls.
+  /// Enqueues velocity = u* + share F of the present state, and the walls' velocities beyond the walls. The
+  /// halo along z of a divided block is left alone; before an odd step its neighbours' populations must be
+  /// there.
   void moments(const Node4<Real>* force, Node4<Real>* velocity, Real share);
   /// A recorded graph of \p steps calls of advance() was replayed.
   void replayed(int steps);

@@ -201,10 +201,11 @@ struct CrossBorder {
 };
 
 /// Writes the walls' velocities into the halo beyond them; once is enough. One thread per halo node of both
-/// walls.
+/// walls. The halo along z of a divided block is left alone.
 template <class Real>
 struct FillWallHalo {
   Block block;
+  bool divided_z;
   Node4<Real> lower, upper;
   Node4<Real>* velocity;
 
@@ -218,6 +219,7 @@ struct FillWallHalo {
     const int level = static_cast<int>(n % (2 * Block::halo));
     const int k = static_cast<int>(n / (2 * Block::halo)) - Block::halo;
     const bool high = level >= Block::halo;
+    if (divided_z && (k < 0 || k >= block.nz)) return;
     velocity[block.at(i, high ? block.ny + level - Block::halo : -1 - level, k)] = high ? upper : lower;
   }
 };

@@ -35,16 +35,33 @@ HEMO_HD inline Quaternion normalized(const Quaternion& q) {
   return {s * q[0], s * q[1], s * q[2], s * q[3]};
 }
 
+// Where a rigid body's points are follows from its orientation alone: computed anew from a saved state they
+// must be what the last step left, to the bit and whichever compiler made it. So matrix() and transform() say
+// where they round: nothing is left to contract.
+
+/// a b + c d, rounded twice.
+HEMO_HD inline double sum_of_products(double a, double b, double c, double d) {
+  return std::fma(a, b, c * d);
+}
+
 HEMO_HD inline Matrix3 matrix(const Quaternion& q) {
   const auto [w, x, y, z] = q;
-  return {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
-          2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-          2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+  return {std::fma(-2.0, sum_of_products(y, y, z, z), 1.0),
+          2 * sum_of_products(x, y, -w, z),
+          2 * sum_of_products(x, z, w, y),
+          2 * sum_of_products(x, y, w, z),
+          std::fma(-2.0, sum_of_products(x, x, z, z), 1.0),
+          2 * sum_of_products(y, z, -w, x),
+          2 * sum_of_products(x, z, -w, y),
+          2 * sum_of_products(y, z, w, x),
+          std::fma(-2.0, sum_of_products(x, x, y, y), 1.0)};
 }
 
 HEMO_HD inline Vec3 transform(const Matrix3& m, const Vec3& v) {
-  return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
-          m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
+  const auto row = [&](int i) {
+    return std::fma(m[i], v[0], sum_of_products(m[i + 1], v[1], m[i + 2], v[2]));
+  };
+  return {row(0), row(3), row(6)};
 }
 HEMO_HD inline Vec3 rotate(const Quaternion& q, const Vec3& v) { return transform(matrix(q), v); }
 

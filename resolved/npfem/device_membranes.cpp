@@ -51,6 +51,7 @@ struct Lists {
 template <class Real>
 DeviceMembranes<Real>::DeviceMembranes(Queue& queue, const Membranes<Real>& host) : queue_(queue) {
   make_tables(host.type());
+  queue.require_shared_memory(shared_bytes());
   upload(host);
 }
 

@@ -13,7 +13,7 @@ class DeviceMembranes {
   using Step = MembraneStep<Real>;
 
   /// Takes over the type and the cells of \p host. \throws InputError for laws the device does not have
-  /// (Helfrich bending, the volume force as printed in the paper).
+  /// (Helfrich bending, the volume force as printed in the paper) and for meshes too large for a block of it.
   DeviceMembranes(Queue& queue, const Membranes<Real>& host);
 
   int count() const { return count_; }

@@ -53,7 +53,8 @@ void DeviceBodies<Real>::step(const StepOptions& options) {
 }
 
 // A body's state as RigidBodies::save writes it: number, anchor, orientation, velocity, spin, then velocities
-// [vertex][3]; offsets and normals follow from the orientation.
+// [vertex][3]; offsets and normals follow from the orientation, to the same bits here and in a step
+// (rotation.hpp).
 template <class Real>
 void DeviceBodies<Real>::upload(const RigidBodies<Real>& host) {
   if (host.count() != count_ || !fields_.pitch) fit(host.count(), host.vertices());

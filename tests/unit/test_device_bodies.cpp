@@ -92,6 +92,45 @@ TEST_P(DeviceBodiesTest, StepLikeTheHostInSinglePrecision) {
   expect_as_on_host<float>(GetParam(), 2 * std::numeric_limits<float>::epsilon());
 }
 
+// What follows from the orientation is made anew when a state comes up (by the host) and in every step (by
+// the kernel): the same bits, or a run that was saved would not go on as the one that was not.
+TEST_P(DeviceBodiesTest, AStateComesBackWithItsPoints) {
+  Pair<double> pair(GetParam(), 9);
+  for (int i = 0; i < 3; ++i) pair.step(20 + i);
+  RigidBodies<double> copy(platelet_type());
+  for (int c = 0; c < 9; ++c) copy.add(0, {0, 0, 0}, mesh::identity_rotation);
+  pair.device->download(copy);
+  const auto& f = pair.device->fields();
+  const std::size_t n = static_cast<std::size_t>(copy.count()) * 3 * f.pitch;
+  Array<double> offset(n), held(n), normal(n);
+  pair.queue.copy(offset.data(), f.offset, n), pair.queue.copy(held.data(), f.held, n);
+  pair.queue.copy(normal.data(), f.normal, n);
+  pair.queue.wait();
+  const auto at = copy.layout();
+  for (int c = 0; c < copy.count(); ++c)
+    for (int k = 0; k < copy.vertices(); ++k)
+      for (int d = 0; d < 3; ++d) {
+        EXPECT_EQ(copy.offsets()[at.at(c, k, d)], offset[f.at(c, d, k)]);
+        EXPECT_EQ(copy.held()[at.at(c, k, d)], held[f.at(c, d, k)]);
+        EXPECT_EQ(copy.normals()[at.at(c, k, d)], normal[f.at(c, d, k)]);
+      }
+}
+
+// Two compilers agree on them because each product that meets a sum is a fused one, in this order.
+TEST(Rotation, RoundsWhereItSays) {
+  Numbers numbers(5);
+  for (int i = 0; i < 100; ++i) {
+    const mesh::Quaternion q = mesh::normalized({numbers(), numbers(), numbers(), numbers()});
+    const Vec3 v{numbers(), numbers(), numbers()};
+    const auto [w, x, y, z] = q;
+    const mesh::Matrix3 m = mesh::matrix(q);
+    EXPECT_EQ(m[0], std::fma(-2.0, std::fma(y, y, z * z), 1.0));
+    EXPECT_EQ(m[5], 2 * std::fma(y, z, -w * x));
+    EXPECT_EQ(m[6], 2 * std::fma(x, z, -w * y));
+    EXPECT_EQ(mesh::transform(m, v)[1], std::fma(m[3], v[0], std::fma(m[4], v[1], m[5] * v[2])));
+  }
+}
+
 TEST_P(DeviceBodiesTest, OrderOfThreadsChangesNoBit) {
   std::vector<std::byte> first;
   for (const HostThreads order : {HostThreads::forward, HostThreads::backward, HostThreads::scattered}) {

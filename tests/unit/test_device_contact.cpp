@@ -147,6 +147,69 @@ TEST_P(DeviceContactTest, PairForcesCancelToTheLastBit) {
   for (int d = 0; d < 3; ++d) EXPECT_EQ(sum[d], 0);
 }
 
+// The impulse is the sum of the steps' forces, also where their grains no longer fit into 64 bits (2^17):
+// three steps of more than half of that.
+TEST_P(DeviceContactTest, WallImpulseDoesNotOverflow) {
+  Crowded<double> crowd(14, 4);
+  crowd.shift({0, 0.5, 0});
+  double force = 0;
+  {
+    OnQueue<double> trial(GetParam(), crowd);
+    (void)trial.forces(crowd);
+    force = std::abs(trial.contact.summary().wall_force[0][1]);
+  }
+  ASSERT_GT(force, 0);
+  crowd.law.stiffness *= 7e4 / force;
+  OnQueue<double> device(GetParam(), crowd);
+  std::array<double, 3> sum{};
+  for (int step = 0; step < 3; ++step) {
+    (void)device.forces(crowd);
+    const Summary summary = device.contact.summary();
+    for (int d = 0; d < 3; ++d) sum[d] += summary.wall_force[0][d];
+  }
+  EXPECT_GT(std::abs(sum[1]), 0x1p17);
+  for (int d = 0; d < 3; ++d)  // three sums of one rounding each
+    EXPECT_NEAR(device.contact.wall_impulse()[0][d], sum[d], 4 * 0x1p-53 * std::abs(sum[1]));
+}
+
+// The last cell has left for another rank: nothing is in contact, and what happened before stays booked,
+// once.
+TEST_P(DeviceContactTest, NobodyLeftMeansNoContact) {
+  Crowded<float> crowd(14, 4);
+  crowd.shift({0, 0.5, 0});
+  OnQueue<float> device(GetParam(), crowd);
+  (void)device.forces(crowd);
+  const auto impulse = device.contact.wall_impulse();
+  EXPECT_NE(impulse[0][1], 0);
+  EXPECT_GT(device.contact.summary().contacts, 0);
+  device.contact.assign({}, 0, {});
+  device.contact.compute(nullptr, nullptr, {});
+  const Summary none = device.contact.summary();
+  EXPECT_EQ(none.contacts, 0);
+  EXPECT_EQ(none.wall_contacts, 0);
+  EXPECT_EQ(none.energy, 0);
+  for (int w = 0; w < 2; ++w)
+    for (int d = 0; d < 3; ++d) EXPECT_EQ(none.wall_force[w][d], 0);
+  EXPECT_TRUE(device.contact.wall_impulse() == impulse);
+  device.contact.assign(OnQueue<float>::shapes_of(crowd), crowd.bodies.size(), {});
+  (void)device.forces(crowd);
+  for (int w = 0; w < 2; ++w)
+    for (int d = 0; d < 3; ++d) EXPECT_EQ(device.contact.wall_impulse()[w][d], 2 * impulse[w][d]);
+}
+
+// A blow-up that is still finite: named, wherever its vertices are, instead of looked up among all others.
+TEST_P(DeviceContactTest, TornCellsAreAnError) {
+  for (const float far : {9.f, 3e5f, 1e12f, 1e30f, std::numeric_limits<float>::infinity()}) {
+    Crowded<float> crowd(14, 4);
+    OnQueue<float> device(GetParam(), crowd);
+    (void)device.forces(crowd);
+    EXPECT_NO_THROW((void)device.contact.summary());
+    crowd.local[20].x += far;
+    (void)device.forces(crowd);
+    EXPECT_THROW((void)device.contact.summary(), PhysicsError) << far;
+  }
+}
+
 TEST_P(DeviceContactTest, OrderOfThreadsChangesNoBit) {
   std::vector<mesh::Vec3> first;
   for (const HostThreads order : {HostThreads::forward, HostThreads::backward}) {
@@ -172,6 +235,15 @@ TEST_P(DeviceContactTest, ListsThatAreTooShortAreAnError) {
       origin.data(), local.data(),
       {block, true, 0, ibm::bin_edge, b.x, b.y, b.z, device.markers.begin(), device.markers.listed(), 1e-3});
   EXPECT_THROW((void)tight.summary(), PhysicsError);
+}
+
+TEST(DeviceContact, RefusesWallsFromASurface) {
+  Crowded<float> crowd(2, 4);
+  crowd.domain.walls.geometry = Walls::Geometry::surface;
+  Queue queue(Place::host);
+  EXPECT_THROW(
+      DeviceContact<float>(queue, crowd.law, crowd.domain, crowd.shapes, OnQueue<float>::shapes_of(crowd)),
+      InputError);
 }
 
 TEST(DeviceContact, RefusesBoxesWithTwoImagesInReach) {

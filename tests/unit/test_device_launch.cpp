@@ -1,8 +1,11 @@
 // The launch layer on the host: every thread once, phases as barriers, recorded work. The functors here are
-// not compiled for a device: what a device does with functors is tested with the solver's own.
+// not compiled for a device, those of support/launch_kernels.cpp are.
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
+#include "support/launch_kernels.hpp"
 #include "support/places.hpp"
 
 namespace hemowalk {
@@ -106,6 +109,32 @@ TEST(Launch, ThreadsThatMeetWithinAPhaseShowInTheirOrder) {
   EXPECT_NE(outcome(HostThreads::forward), outcome(HostThreads::backward));
 }
 
+// Wrong on purpose: a block takes what the one before it has left.
+struct RacingBlocks {
+  static constexpr int threads = 1;
+  int* out;
+  int phases() const { return 1; }
+  void operator()(int, BlockThread at, unsigned char*) const {
+    out[at.block] = at.block == 0 ? 1 : out[at.block - 1] + 1;
+  }
+};
+
+TEST(Launch, BlocksThatMeetShowInTheirOrder) {
+  Queue queue(Place::host);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto outcome = [&](HostThreads order) {
+    test::ThreadOrder now(order);
+    Array<int> out(5);
+    queue.blocks(5, 0, RacingBlocks{out.data()});
+    return std::vector<int>(out.begin(), out.end());
+  };
+  EXPECT_EQ(outcome(HostThreads::forward), (std::vector<int>{1, 2, 3, 4, 5}));
+  for (const HostThreads order : {HostThreads::backward, HostThreads::scattered})
+    EXPECT_EQ(outcome(order), (std::vector<int>{1, 1, 1, 1, 1}));
+  omp_set_num_threads(before);
+}
+
 TEST(Launch, ScatteredOrderIsAPermutation) {
   for (const unsigned n : {1u, 32u, 96u, 288u, 1024u}) {
     std::vector<int> seen(n, 0);
@@ -117,10 +146,10 @@ TEST(Launch, ScatteredOrderIsAPermutation) {
 TEST(Launch, RecordedWorkRunsWhenReplayedOnly) {
   Queue queue(Place::host);
   Array<unsigned> visits(10);
-  queue.begin_recording();
-  queue.for_each(visits.size(), CountVisits{visits.data()});
-  queue.for_each(5, CountVisits{visits.data()});
-  const Graph graph = queue.end_recording();
+  const Graph graph = queue.record([&] {
+    queue.for_each(visits.size(), CountVisits{visits.data()});
+    queue.for_each(5, CountVisits{visits.data()});
+  });
   EXPECT_EQ(graph.size(), 2u);
   EXPECT_EQ(visits[0], 0u);
   queue.replay(graph);
@@ -129,6 +158,67 @@ TEST(Launch, RecordedWorkRunsWhenReplayedOnly) {
   EXPECT_EQ(visits[9], 2u);
   queue.for_each(1, CountVisits{visits.data()});  // recording has ended
   EXPECT_EQ(visits[0], 5u);
+}
+
+TEST(Launch, BlocksThatNoDeviceHoldsAreAnInputError) {
+  Queue queue(Place::host);
+  EXPECT_NO_THROW(queue.require_shared_memory(227 * 1024));
+  EXPECT_THROW(queue.require_shared_memory(227 * 1024 + 1), InputError);
+}
+
+class LaunchTest : public test::OnPlace {};
+HEMOWALK_ON_BOTH_PLACES(LaunchTest);
+
+TEST_P(LaunchTest, BlocksWorkTogetherThroughLargeSharedMemory) {
+  constexpr std::size_t n = test::reversed_length, blocks = 3;
+  Queue queue(GetParam());
+  queue.require_shared_memory(n * sizeof(int));
+  std::vector<int> values(blocks * n);
+  std::iota(values.begin(), values.end(), 0);
+  Array<int> there = make_array(GetParam(), values);
+  test::reverse_pieces(queue, there.data(), blocks);
+  queue.wait();
+  const auto back = place_copy(Place::host, there);
+  for (std::size_t b = 0; b < blocks; ++b)
+    for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(back[b * n + i], static_cast<int>(b * n + n - 1 - i));
+}
+
+// A graph holds addresses, not values: what lies in pinned memory when it is replayed goes up, through both
+// kernels, and down.
+TEST_P(LaunchTest, GraphsReplayKernelsAndCopies) {
+  constexpr std::size_t n = test::reversed_length;
+  Queue queue(GetParam());
+  PinnedArray<int> up(GetParam(), n), down(GetParam(), n);
+  Array<int> there(n, GetParam());
+  const Graph graph = queue.record([&] {
+    queue.copy(there.data(), std::as_const(up).data(), n);
+    test::add_one(queue, there.data(), n);
+    test::reverse_pieces(queue, there.data(), 1);
+    queue.copy(down.data(), std::as_const(there).data(), n);
+  });
+  EXPECT_EQ(graph.size(), 4u);
+  EXPECT_EQ(down[0], 0) << "nothing is done while it is recorded";
+  for (const int from : {0, 1000}) {
+    for (std::size_t i = 0; i < n; ++i) up[i] = from + static_cast<int>(i);
+    queue.replay(graph);
+    queue.wait();
+    for (std::size_t i = 0; i < n; ++i) ASSERT_EQ(down[i], from + static_cast<int>(n - i));
+  }
+}
+
+// What a device refuses while work is recorded must not leave the queue recording.
+TEST_P(LaunchTest, WorkThatThrowsIsNotKept) {
+  Queue queue(GetParam());
+  Array<int> there(3, GetParam());
+  EXPECT_THROW((void)queue.record([&] {
+    test::add_one(queue, there.data(), 3);
+    throw InputError("no");
+  }),
+               InputError);
+  test::add_one(queue, there.data(), 1);  // done at once
+  queue.wait();
+  EXPECT_EQ(place_copy(Place::host, there)[0], 1);
+  EXPECT_EQ(queue.record([&] { test::add_one(queue, there.data(), 1); }).size(), 1u);
 }
 
 TEST(Launch, IntegerAtomics) {
@@ -152,6 +242,17 @@ TEST(Launch, ArraysGrowAndKeepWhatTheyHold) {
   EXPECT_EQ(array.size(), 3u);
   queue.fit(array, 8);
   EXPECT_EQ(array.size(), 10u) << "room for a quarter more";
+  EXPECT_EQ(array[2], 9);
+}
+
+TEST(Launch, PinnedArraysGrowAndKeepWhatTheyHold) {
+  PinnedArray<int> array(Place::host, 3);
+  array[2] = 9;
+  const int* before = array.data();
+  array.fit(3);
+  EXPECT_EQ(array.data(), before) << "pinned once";
+  array.fit(8);
+  EXPECT_EQ(array.size(), 10u);
   EXPECT_EQ(array[2], 9);
 }
 

@@ -4,7 +4,11 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <sstream>
+#include <string>
+#include <utility>
 
 #include "core/check.hpp"
 #include "core/mpi.hpp"
@@ -69,6 +73,13 @@ constexpr Row rows[] = {{"fluid", "fluid", &Timings::fluid},
                         {"communication", "communication", &Timings::communication},
                         {"other", "other", &Timings::other}};
 
+std::array<std::pair<const char*, const char*>, 3> places(const data::Scene& scene) {
+  const auto name = [](Place place) { return place == Place::host ? "host" : "device"; };
+  return {{{"fluid", name(scene.place.fluid)},
+           {"coupling", name(scene.place.coupling)},
+           {"solid", name(scene.place.solid)}}};
+}
+
 nlohmann::ordered_json to_json(const std::string& name, const data::Scene& scene, const BenchReport& r) {
   const Timings& t = r.parts;
   nlohmann::ordered_json o;
@@ -77,6 +88,7 @@ nlohmann::ordered_json to_json(const std::string& name, const data::Scene& scene
   o["threads"] = r.threads, o["ranks"] = r.ranks;
   o["precision"] = scene.fluid.precision == data::Fluid::Precision::double_ ? "double" : "single";
   o["acceleration"] = scene.acceleration;
+  for (const auto& [part, place] : places(scene)) o["place"][part] = place;
   o["packing"] = r.packing;
   o["steps"] = r.parts.steps;
   o["step_ms"] = {{"median", 1e3 * r.step.median},
@@ -96,7 +108,7 @@ nlohmann::ordered_json to_json(const std::string& name, const data::Scene& scene
   o["ceilings"] = {{"bandwidth_gb_per_s", 1e-9 * r.bandwidth}, {"fma_gflop_per_s", 1e-9 * r.fma}};
   o["fluid"] = {{"mlups", finite(r.mlups())},
                 {"bytes_per_node", r.bytes_per_node},
-                {"fraction_of_roofline", finite(r.least.fluid / t.fluid)}};
+                {"fraction_of_roofline", r.least.fluid > 0 ? finite(r.least.fluid / t.fluid) : nullptr}};
   o["memory_mb"] = 1e-6 * r.memory;
   o["iterations_mean"] = r.iterations_mean;
   o["momentum_residual_rel"] = r.momentum_residual;
@@ -109,10 +121,13 @@ void print(const std::string& name, const data::Scene& scene, const BenchReport&
       "{}: {} nodes, {} markers, {} red cells, {} platelets ({}); {} ranks of {} threads, acceleration "
       "{:g}\n",
       name, r.nodes, r.markers, r.rbc, r.platelets, r.packing, r.ranks, r.threads, scene.acceleration);
+  for (const auto& [part, place] : places(scene))
+    fmt::print("{} on the {}{}", part, place, part == std::string("solid") ? "\n" : ", ");
   fmt::print("ceilings of this run: {:.1f} GB/s, {:.0f} Gflop/s\n\n{:<26}{:>10}{:>9}{:>22}\n",
              1e-9 * r.bandwidth, 1e-9 * r.fma, "part", "ms/step", "share", "fraction of ceiling");
   for (const auto& row : rows) {
     const double time = r.parts.*row.time, least = r.least.*row.time;
+    if (std::isnan(time)) continue;  // not timed: the whole step on several devices
     fmt::print("{:<26}{:>10.3f}{:>8.1f}%{:>22}\n", row.name, 1e3 * time, 100 * time / r.step.median,
                least > 0 ? fmt::format("{:.2f}", least / time) : "-");
   }
