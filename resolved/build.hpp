@@ -10,8 +10,8 @@
 #include "resolved/ibm/markers.hpp"
 #include "resolved/lbm/fluid.hpp"
 #include "resolved/mesh/mesh.hpp"
+#include "resolved/mirror_surface.hpp"
 #include "resolved/npfem/material.hpp"
-#include "resolved/retraction.hpp"
 #include "resolved/units.hpp"
 
 namespace hemowalk::resolved {

@@ -3,19 +3,13 @@
 /// surface (docs/adr/0008): coupling.hpp with a pack per number. Fields are [vertex][3][lane].
 
 #include <array>
-#include <vector>
 
 #include "core/block.hpp"
 #include "core/simd.hpp"
 #include "resolved/coupling.hpp"
+#include "resolved/mirror_surface.hpp"
 
 namespace hemowalk::resolved {
-
-/// Which vertex mirrors which, and the shares of drawn_in(). Empty: the normals' retraction.
-struct MirrorSurface {
-  std::vector<int> mirror;
-  double axial = 0, radial = 0;
-};
 
 /// Vertex k of a field, all lanes.
 template <int lanes, class Real>

@@ -12,6 +12,7 @@
 #include "core/check.hpp"
 #include "resolved/build.hpp"
 #include "resolved/region.hpp"
+#include "resolved/retraction.hpp"
 #include "resolved/stopwatch.hpp"
 
 namespace hemowalk::resolved {

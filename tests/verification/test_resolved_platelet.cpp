@@ -6,6 +6,7 @@
 #include "core/check.hpp"
 #include "resolved/build.hpp"
 #include "resolved/mesh/vector.hpp"
+#include "resolved/retraction.hpp"
 #include "support/single_body.hpp"
 
 namespace hemowalk::resolved {
