@@ -17,7 +17,7 @@ class Figure {
  public:
   enum class Style { line, dashes, points, dots };  ///< dots: a line with points on it
 
-  /// Axis titles with units.
+  /// Axis titles with units. No apostrophes in texts: gnuplot's strings end with them.
   Figure(std::string name, std::string title, std::string x, std::string y)
       : name_(std::move(name)), title_(std::move(title)), x_(std::move(x)), y_(std::move(y)) {}
 

@@ -99,7 +99,7 @@ TEST(Rheology, ViscosityOverHematocrit) {
       .write();
   test::Figure("plasma_layer", "Red cells between walls 20 µm apart", "hematocrit", "plasma layer, µm")
       .with("set yrange [0:]")
-      .curve("hematocrit below half the core's", Style::points, 0, nominal, layer, layer_error)
+      .curve("hematocrit below half of that in the core", Style::points, 0, nominal, layer, layer_error)
       .write();
 }
 
