@@ -17,7 +17,7 @@ class Figure {
  public:
   enum class Style { line, dashes, points, dots };  ///< dots: a line with points on it
 
-  /// Axis titles with units. No apostrophes in texts: gnuplot's strings end with them.
+  /// Axis titles with units.
   Figure(std::string name, std::string title, std::string x, std::string y)
       : name_(std::move(name)), title_(std::move(title)), x_(std::move(x)), y_(std::move(y)) {}
 
@@ -61,6 +61,13 @@ class Figure {
     std::vector<double> x, y, error;
   };
 
+  /// For a string in single quotes, where gnuplot takes two for one.
+  static std::string quotable(const std::string& text) {
+    std::string out;
+    for (const char c : text) out += c == '\'' ? "''" : std::string(1, c);
+    return out;
+  }
+
   void draw(const std::string& stem) const {
     // Okabe and Ito 2008: told apart by colour-blind readers too.
     static const char* const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
@@ -74,7 +81,8 @@ class Figure {
                  "set title '%s' noenhanced\nset xlabel '%s' noenhanced\nset ylabel '%s' noenhanced\n"
                  "set grid lc rgb '#dddddd'\nset key outside right center noenhanced samplen 2\n"
                  "set border 3 lc rgb '#444444'\nset tics nomirror\n%s",
-                 stem.c_str(), title_.c_str(), x_.c_str(), y_.c_str(), settings_.c_str());
+                 stem.c_str(), quotable(title_).c_str(), quotable(x_).c_str(), quotable(y_).c_str(),
+                 settings_.c_str());
     for (std::size_t i = 0; i < curves_.size(); ++i) {
       const Curve& c = curves_[i];
       const std::string rgb = c.colour < 0 ? "#888888" : colours[c.colour % 8];
@@ -85,7 +93,7 @@ class Figure {
       if (c.style == Style::dots)
         with = c.error.empty() ? "linespoints lw 1.5 pt 7 ps 0.5" : "yerrorlines lw 1.5 pt 7 ps 0.5";
       std::fprintf(plot, "%s '-' using %s with %s lc rgb '%s' title '%s'", i ? "," : "plot",
-                   c.error.empty() ? "1:2" : "1:2:3", with.c_str(), rgb.c_str(), c.label.c_str());
+                   c.error.empty() ? "1:2" : "1:2:3", with.c_str(), rgb.c_str(), quotable(c.label).c_str());
     }
     std::fprintf(plot, "\n");
     for (const Curve& c : curves_) {
