@@ -5,8 +5,9 @@ usage: tools/suspension_table.py [--from MS] [--to MS] [--lag MS] [--profiles ST
 
 Times in ms. Core: the middle 40 % of the gap. Square displacements across the stream (y) are over all cells and
 all origins of the window, um2, +- the standard error over cells. Stress, velocity and hematocrit are means over the window;
-mu is that of the default plasma. Longest step: of any cell between two samples, along the flow over
-that of a wall relative to the other, and across it, um. --profiles STEM writes STEM.csv and, with gnuplot, STEM.svg: the mean velocity over the height, a curve per run.
+mu is that of the default plasma. Longest step: of any cell between two samples, along the flow over that of a wall
+relative to the other, and across it, um. --profiles STEM writes STEM.csv and, with gnuplot, STEM.svg: the mean velocity
+over the height, a curve per run (plasma alone: walls at +- U/2).
 """
 import argparse
 import os
@@ -27,7 +28,7 @@ def square_displacement(position, time, window, lag):
 
 
 def longest_step(position, way):
-    """Between neighbouring samples: along the flow, over \p way; across it, um."""
+    """Between neighbouring samples: along the flow, over way; across it, um."""
     step = np.abs(np.diff(position, axis=0))
     return step[:, :, 2].max() / way, 1e6 * step[:, :, 1].max()
 

@@ -163,8 +163,8 @@ TEST(Suspension, StressOverTheChoicesOfTheStep) {
 // Nothing tells top from bottom: over packings the asymmetries of single ones average out, while in each the
 // stress is the same at both walls. Four means are looked at: at a level of 1 % for all of them (0.25 % each,
 // two-sided) Student's t with 7 degrees of freedom allows 4.6 standard errors. A true asymmetry of 5.8 is
-// found with a power of 80 %, one of 6.5 with 90: by the scatter of single packings (0.050, 0.059, 0.30,
-// 0.003 in the order below) 0.10, 0.12 U, a ratio of 1.8 and 0.006 U.
+// found with a power of 80 %, one of 6.5 with 90: by the scatter of single packings (0.049, 0.060, 0.20,
+// 0.0024 in the order below) 0.10, 0.12 U, a ratio of 1.5 and 0.005 U.
 TEST(Suspension, TopAndBottomOverPackings) {
   constexpr int packings = 8;
   const double from = 100e-3, end = 300e-3;
