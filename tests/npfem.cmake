@@ -9,7 +9,9 @@ hemowalk_test(test_npfem_terms SOURCES unit/test_npfem_terms.cpp LINK hemowalk_n
 hemowalk_test(test_npfem_batch SOURCES unit/test_npfem_batch.cpp LINK hemowalk_npfem LABELS unit)
 hemowalk_test(test_rigid SOURCES unit/test_rigid_bodies.cpp LINK hemowalk_rigid LABELS unit)
 hemowalk_test(test_npfem_dynamics SOURCES verification/test_npfem_dynamics.cpp LINK hemowalk_npfem LABELS verification)
-hemowalk_test(test_boundary_integral SOURCES verification/test_boundary_integral.cpp LINK hemowalk_npfem LABELS verification)
+hemowalk_test(test_boundary_integral
+  SOURCES verification/test_boundary_integral.cpp
+  LINK hemowalk_npfem Eigen3::Eigen LABELS verification)
 
 find_package(benchmark QUIET)
 if(benchmark_FOUND)

@@ -28,10 +28,10 @@ if(TARGET hemowalk_resolved)
   hemowalk_test(validate_resolved
     SOURCES validation/test_resolved_thickness.cpp validation/test_resolved_suspension.cpp
             validation/test_resolved_vessel.cpp validation/test_resolved_acceleration.cpp validation/test_default_coupling.cpp
-    LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH
+    LINK hemowalk_resolved Eigen3::Eigen LABELS validation TIMEOUT 14400 EACH
     FIRST Vessel.PriesAt40um Vessel.PriesAt20umAnd15PerCent Vessel.PriesAt20umAnd30PerCent Suspension.TopAndBottomOverPackings)
   hemowalk_test(validate_rheology SOURCES validation/test_rheology.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH)
   hemowalk_test(validate_energy SOURCES validation/test_energy.cpp validation/test_leakage.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH)
-  hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp validation/test_red_cells.cpp LINK hemowalk_resolved LABELS validation TIMEOUT 14400 EACH
+  hemowalk_test(validate_capsule SOURCES validation/test_capsule.cpp validation/test_red_cells.cpp LINK hemowalk_resolved Eigen3::Eigen LABELS validation TIMEOUT 14400 EACH
     FIRST PairCollision.UnderTheThreeCouplings PairCollision.PushesCellsApartAtAnyAcceleration RedCell.TreadsAsTheBoundaryIntegral)
 endif()

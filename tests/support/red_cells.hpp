@@ -12,7 +12,6 @@
 #include "resolved/mesh/vector.hpp"
 #include "resolved/recovery.hpp"
 #include "resolved/simulation.hpp"
-#include "support/boundary_integral.hpp"
 #include "support/single_body.hpp"
 
 namespace hemowalk::test {
@@ -112,9 +111,12 @@ struct ShearCase {
   data::Vec3 box{14, 16, 14};  ///< um
 };
 
+/// Of a red cell's mesh that follows the lattice: 258, 578, 1026 vertices at dx 0.5, 1/3, 0.25 um.
+inline int subdivision_at(double dx) { return static_cast<int>(std::lround(4 / dx)); }
+
 inline Shear red_cell_in_shear(const ShearCase& c) {
   auto kind = red_cell_kind(c.kappa);
-  kind.subdivision = static_cast<int>(std::lround(4 / c.dx));
+  kind.subdivision = subdivision_at(c.dx);
   auto scene = shear_scene(c.box, c.acceleration, {kind});
   scene.fluid.dx = 1e-6 * c.dx;
   scene.flow.shear_rate = c.shear_rate, scene.coupling = c.coupling;
@@ -127,29 +129,6 @@ inline Shear red_cell_in_shear(const ShearCase& c) {
   for (int i = 1; !record.done(); ++i) {
     sim.step();
     if (i % every == 0) record.add(i * rate, observe(sim, 0, 0));
-  }
-  return record.result();
-}
-
-/// The same cell (kappa 0) by the boundary integral: unbounded plasma, no inertia. The area modulus of the
-/// paper's law allows time steps of 1 us with 258 vertices.
-inline Shear red_cell_in_stokes_flow(const ShearCase& c, int subdivision = 8) {
-  const auto rest = mesh::red_cell(1, subdivision);
-  const npfem::CellType type(rest, npfem::Material{}, std::vector<double>(rest.vertices.size(), 1.0), 1);
-  const BoundaryIntegral fluid(rest, 1.025e-3);  // Pa s = pN s/um2
-  auto x = rest.vertices;
-  for (auto& p : x) p = mesh::rotate(mesh::rotation({1, 0, 0}, c.angle), p);
-  ShearRecord record(mesh::observe(rest, x, type.marker()), c.from, c.until);
-  const int every = std::max(1, static_cast<int>(25000 / c.shear_rate));
-  const double dt = between_looks / every / c.shear_rate;
-  for (int i = 1; !record.done(); ++i) {
-    advance_in_stokes_flow(
-        type, fluid, dt,
-        [&](const mesh::Vec3& p) {
-          return mesh::Vec3{0, 0, c.shear_rate * p[1]};
-        },
-        x);
-    if (i % every == 0) record.add(i * dt * c.shear_rate, mesh::observe(rest, x, type.marker()));
   }
   return record.result();
 }
@@ -215,11 +194,15 @@ inline double share_left(const std::vector<mesh::Vec3>& now, const std::vector<m
 
 /// How a red cell lying any way comes back, s: stretched by \p strain along its own x axis and released in
 /// fluid at rest; time constant of the displacement imposed from 80 to 40 % of it (the program's t_c is the
-/// 1/e time of the length, below). Lattice of \p nodes a side; looks \p every so many steps.
-inline double return_time(double kappa, double acceleration, const mesh::Quaternion& orientation, int nodes,
-                          int every, double strain = 0.1, const data::Coupling& coupling = {}) {
-  const double box = nodes / 2, middle = nodes / 2.0;
-  auto scene = shear_scene({box, box, box}, acceleration, {red_cell_kind(kappa)});
+/// 1/e time of the length, below). Periodic \p box, um; looks \p every so many steps.
+inline double return_time(double kappa, double acceleration, const mesh::Quaternion& orientation, double box,
+                          int every, double dx = 0.5, double strain = 0.1,
+                          const data::Coupling& coupling = {}) {
+  const double middle = box / 2 / dx;
+  auto kind = red_cell_kind(kappa);
+  kind.subdivision = subdivision_at(dx);
+  auto scene = shear_scene({box, box, box}, acceleration, {kind});
+  scene.fluid.dx = 1e-6 * dx;
   scene.domain.geometry = data::Domain::Geometry::periodic, scene.flow.type = data::Flow::Type::rest;
   scene.coupling = coupling;
   auto rest = resolved::make_mesh(scene.cells.kinds[0], scene.fluid.dx).vertices;
@@ -238,30 +221,6 @@ inline double return_time(double kappa, double acceleration, const mesh::Quatern
     const double left = share_left(cells.positions(0), rest, imposed);
     if (early == 0 && left < 0.8) early = sim.time();
     if (left < 0.4) return (sim.time() - early) / std::log(2.0);
-  }
-  return std::nan("");
-}
-
-/// The same time (kappa 0) in unbounded Stokes flow by the boundary integral, s.
-inline double return_time_in_stokes_flow(double strain = 0.1, int subdivision = 8) {
-  const auto mesh_at_rest = mesh::red_cell(1, subdivision);
-  const npfem::CellType type(mesh_at_rest, npfem::Material{},
-                             std::vector<double>(mesh_at_rest.vertices.size(), 1.0), 1);
-  const BoundaryIntegral fluid(mesh_at_rest, 1.025e-3);  // Pa s = pN s/um2
-  const auto& rest = mesh_at_rest.vertices;
-  auto x = rest, imposed = rest;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    imposed[k] = {rest[k][0] * strain, 0, rest[k][2] / (1 + strain) - rest[k][2]};
-    x[k] = mesh::add(rest[k], imposed[k]);
-  }
-  constexpr double dt = 1e-6;
-  double early = 0;
-  for (int i = 1; i * dt < 0.1; ++i) {
-    advance_in_stokes_flow(
-        type, fluid, dt, [](const mesh::Vec3&) { return mesh::Vec3{}; }, x);
-    const double left = share_left(x, rest, imposed);
-    if (early == 0 && left < 0.8) early = i * dt;
-    if (left < 0.4) return (i * dt - early) / std::log(2.0);
   }
   return std::nan("");
 }

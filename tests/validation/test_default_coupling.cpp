@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <map>
 
-#include "support/red_cells.hpp"
+#include "support/red_cells_in_stokes_flow.hpp"
 #include "support/sheets.hpp"
 #include "support/single_body.hpp"
 #include "support/suspension.hpp"
@@ -114,8 +114,8 @@ TEST(DefaultCoupling, JointlyAgainstAllItActsOn) {
     d.sphere = test::stokes_radius(sphere, 2) / 2.5 - 1;
     d.platelet = of_platelet(c);
     d.capsule = of_capsule(c, capsule, &d.volume);
-    const double narrow = test::return_time(0, 50, mesh::identity_rotation, 40, 2, 0.1, c),
-                 wide = test::return_time(0, 50, mesh::identity_rotation, 60, 2, 0.1, c);
+    const double narrow = test::return_time(0, 50, mesh::identity_rotation, 20, 2, 0.5, 0.1, c),
+                 wide = test::return_time(0, 50, mesh::identity_rotation, 30, 2, 0.5, 0.1, c);
     d.recovery = (wide - (narrow - wide) / (std::pow(1.5, 3) - 1)) / recovery - 1;
     d.blood = of_blood(c, blood);
     std::printf("| %.2f | %.2f | %.2f | %.3f | %+.3f | %.3f | %.3f | %+.3f | %+.3f | **%.3f** | %.2f |\n",
