@@ -133,24 +133,38 @@ inline Shear red_cell_in_shear(const ShearCase& c) {
   return record.result();
 }
 
+/// Two bodies, the first and the last of \p kinds, that pass each other: they start apart_before um from each
+/// other along the flow and offset um across it.
+struct CollisionCase {
+  std::vector<data::Kind> kinds;
+  double acceleration = 50, offset = 2.5;                          ///< um
+  double dx = 0.5;                                                 ///< um; meshes follow it
+  double wider = 1;                                                ///< the box over the usual one
+  std::function<void(data::Scene&)> change = [](data::Scene&) {};  ///< what else is different
+};
+constexpr double apart_before = 11;              ///< um
+constexpr data::Vec3 collision_box{14, 18, 36};  ///< um; images along the flow are farther than the partner
+
 struct Collision {
   double net = 0;   ///< um across the flow that each was moved by for good
   double peak = 0;  ///< um, the most in between
 };
 
-/// Two bodies of \p kinds (the first and the last) that pass each other. They start \p apart um from each
-/// other along the flow and \p offset um across it, and the run ends when they are as far apart on the other
-/// side. \p change: what else is different in the scene.
-inline Collision collide(
-    std::vector<data::Kind> kinds, double acceleration, double offset, double apart = 11,
-    const std::function<void(data::Scene&)>& change = [](data::Scene&) {}) {
-  const data::Vec3 box{14, 18, 36};  // images along the flow stay farther away than the partner
+/// The run ends when they are as far apart on the other side as at the start; NaN if that takes a strain
+/// of 40.
+inline Collision collide(const CollisionCase& c) {
+  data::Vec3 box = collision_box;
+  for (double& length : box) length *= c.wider;
+  auto kinds = c.kinds;
+  for (auto& k : kinds) k.subdivision = static_cast<int>(std::lround(k.subdivision * 0.5 / c.dx));
   const int last = static_cast<int>(kinds.size()) - 1;
-  auto scene = shear_scene(box, acceleration, std::move(kinds));
-  change(scene);
-  const double half = offset / 2 / 0.5, away = apart / 2 / 0.5;  // dx
-  resolved::Simulation<float> sim(scene, {{0, {14, 18 + half, 36 - away}, mesh::identity_rotation, {}},
-                                          {last, {14, 18 - half, 36 + away}, mesh::identity_rotation, {}}});
+  auto scene = shear_scene(box, c.acceleration, std::move(kinds));
+  scene.fluid.dx = 1e-6 * c.dx;
+  c.change(scene);
+  const double half = c.offset / 2 / c.dx, away = apart_before / 2 / c.dx;
+  const double x = box[0] / 2 / c.dx, y = box[1] / 2 / c.dx, z = box[2] / 2 / c.dx;
+  resolved::Simulation<float> sim(scene, {{0, {x, y + half, z - away}, mesh::identity_rotation, {}},
+                                          {last, {x, y - half, z + away}, mesh::identity_rotation, {}}});
   const double rate = sim.units().rate(100);
   const auto second = [&] { return last ? observe(sim, 1, 0) : observe(sim, 0, 1); };
   const double start = observe(sim, 0, 0).centre[1] - second().centre[1];
@@ -159,20 +173,22 @@ inline Collision collide(
     sim.step();
     if (i % 50) continue;
     const auto a = observe(sim, 0, 0).centre, b = second().centre;
-    out.net = 0.25 * (a[1] - b[1] - start);  // half of it each, 0.5 um per dx
+    out.net = c.dx / 2 * (a[1] - b[1] - start);  // half of it each
     out.peak = std::max(out.peak, out.net);
     if (a[2] - b[2] > 2 * away) return out;
   }
   return {std::nan(""), std::nan("")};
 }
 
-/// How far, um, the upper of two red cells that collide as above moves across the flow where there is no
-/// other: tumbling and lift off the walls, over the time in which undisturbed they would pass.
-inline double drift_alone(double acceleration, double offset, double kappa = 0.5, double apart = 11) {
-  const auto scene = shear_scene({14, 18, 36}, acceleration, {red_cell_kind(kappa)});
-  resolved::Simulation<float> sim(scene, {{0, {14, 18 + offset, 36 - apart}, mesh::identity_rotation, {}}});
+/// How far, um, the upper of two red cells (kappa 0.5, dx 0.5 um) that collide as above moves across the flow
+/// where there is no other: tumbling and lift off the walls, over the time in which undisturbed they would
+/// pass.
+inline double drift_alone(double acceleration, double offset) {
+  const auto scene = shear_scene(collision_box, acceleration, {red_cell_kind(0.5)});
+  resolved::Simulation<float> sim(scene,
+                                  {{0, {14, 18 + offset, 36 - apart_before}, mesh::identity_rotation, {}}});
   const double start = observe(sim, 0, 0).centre[1];
-  const auto steps = static_cast<std::int64_t>(2 * apart / offset / sim.units().rate(100));
+  const auto steps = static_cast<std::int64_t>(2 * apart_before / offset / sim.units().rate(100));
   for (std::int64_t i = 0; i < steps; ++i) sim.step();
   return 0.5 * (observe(sim, 0, 0).centre[1] - start);
 }

@@ -2,6 +2,8 @@
 // of docs/evidence/validation.md.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -260,7 +262,7 @@ TEST(PairCollision, PushesCellsApartAtAnyAcceleration) {
     if (name == "platelet") kinds.push_back(test::platelet_kind());
     std::optional<double> first;
     for (const double s : test::accelerations("32,50")) {
-      const auto c = test::collide(kinds, s, 2.5);
+      const auto c = test::collide({kinds, s});
       if (!first) first = c.net;
       std::printf("%s %.0f | %.5f %.5f\n", name.c_str(), s, c.net, c.peak);
       std::fflush(stdout);
@@ -280,7 +282,7 @@ TEST(PairCollision, UnderTheThreeCouplings) {
     std::printf("%s %s %.1f %.0f | ", name, platelet ? "platelet" : "red cell", kappa, s);
     test::Collision c;
     try {
-      c = test::collide(kinds, s, 2.5, 11, change);
+      c = test::collide({.kinds = kinds, .acceleration = s, .change = change});
       std::isnan(c.net) ? std::printf("have not passed at a strain of 40\n")
                         : std::printf("%.4f %.4f\n", c.net, c.peak);
     } catch (const PhysicsError& error) {
@@ -330,7 +332,7 @@ TEST(PairCollision, OverTheOffset) {
       "without it\n");
   double before = 1e9, last_offset = 1;
   for (const double offset : {2.5, 4.0, 5.5}) {
-    const auto c = test::collide({test::red_cell_kind(0.5)}, 50, offset);
+    const auto c = test::collide({{test::red_cell_kind(0.5)}, 50, offset});
     const double alone = test::drift_alone(50, offset), partner = c.peak - alone;
     std::printf("%.1f | %.4f %.4f %.4f %.4f\n", offset, c.net, c.peak, alone, partner);
     std::fflush(stdout);
@@ -341,25 +343,95 @@ TEST(PairCollision, OverTheOffset) {
   }
 }
 
+// Lattice and meshes finer: what cells keep, a small difference, and how far they get meanwhile.
+TEST(PairCollision, OverLatticeSpacing) {
+  std::printf("partner, dx/um | net, peak displacement/um\n");
+  for (const bool platelet : {false, true}) {
+    std::vector<data::Kind> kinds{test::red_cell_kind(0.5)};
+    if (platelet) kinds.push_back(test::platelet_kind());
+    double coarse = 0;
+    for (const double dx : {0.5, 1.0 / 3}) {
+      const auto c = test::collide({.kinds = kinds, .dx = dx});
+      std::printf("%s %.3f | %.4f %.4f\n", platelet ? "platelet" : "red cell", dx, c.net, c.peak);
+      std::fflush(stdout);
+      if (dx == 0.5)
+        coarse = c.peak;
+      else
+        EXPECT_NEAR(c.peak / coarse, 1, 0.15);
+    }
+  }
+}
+
+data::Kind rigid_sphere() {
+  auto sphere = test::platelet_kind();
+  sphere.shape.type = data::Shape::Type::sphere, sphere.shape.radii = {2e-6, 2e-6, 2e-6},
+  sphere.subdivision = 7;
+  sphere.density = 1025;
+  return sphere;
+}
+
 // Smooth rigid spheres beyond the reach of contact: Stokes flow is reversible, they must part as they came.
 // What is left is inertia, first order in Re = gamma a^2/nu = 4e-4 times the acceleration (0.7 to 0.9 Re of
 // the largest displacement are seen; 1.5 allowed), beside 5e-4 um for round-off: a straight line through both
 // accelerations leaves 1e-4 at none.
 TEST(PairCollision, OfSpheresIsReversible) {
-  auto sphere = test::platelet_kind();
-  sphere.shape.type = data::Shape::Type::sphere, sphere.shape.radii = {2e-6, 2e-6, 2e-6},
-  sphere.subdivision = 7;
-  sphere.density = 1025;
   std::printf("offset/um, acceleration | spheres of 2 um: net, peak displacement/um\n");
   for (const double offset : {5.0, 4.0})
     for (const double s : {50.0, 16.0}) {
       if (offset > 4 && s < 50) continue;
-      const auto c = test::collide({sphere}, s, offset);
+      const auto c = test::collide({{rigid_sphere()}, s, offset});
       std::printf("%.1f %.0f | %.4f %.4f\n", offset, s, c.net, c.peak);
       std::fflush(stdout);
       EXPECT_GT(c.peak, 0.1);
       EXPECT_NEAR(c.net, 0, 1.5 * 4e-4 * s * c.peak + 5e-4);
     }
+}
+
+/// Largest displacement, um, of each of two spheres of radius 2 um in unbounded Stokes flow on the same way:
+/// the relative velocity of Batchelor and Green (1972) with the mobilities A and B as da Cunha and Hinch
+/// (1996) give them for r > 2.5 radii.
+double sphere_displacement_in_stokes_flow(double offset) {
+  using State = std::array<double, 2>;  // across and along the flow, radii
+  const auto rate = [](const State& s) {
+    const auto [y, z] = s;
+    const double r = std::hypot(y, z), q = y * z / (r * r);
+    const auto over = [&](double power) { return std::pow(r, -power); };
+    const double A = 5 * over(3) - 8 * over(5) + 25 * over(6) - 35 * over(8) + 125 * over(9) -
+                     102 * over(11) + 12.5 * over(12) + 430 * over(14),
+                 B = (16 * over(5) + 10 * over(8) - 36 * over(10) - 25 * over(11) - 36 * over(12)) / 3;
+    return State{-A * y * q - B * (z / 2 - y * q), y - A * z * q - B * (y / 2 - z * q)};
+  };
+  State s{offset / 2, -test::apart_before / 2};
+  double most = 0;
+  constexpr double h = 1e-3;
+  while (s[1] < test::apart_before / 2) {
+    const State k = rate(s), middle = rate({s[0] + h / 2 * k[0], s[1] + h / 2 * k[1]});
+    for (int d = 0; d < 2; ++d) s[d] += h * middle[d];
+    most = std::max(most, s[0] - offset / 2);
+  }
+  return most;  // half of it each, 2 um per radius
+}
+
+// Spheres push each other aside as far as they should, images and walls taken off by two boxes.
+TEST(PairCollision, OfSpheresAsInStokesFlow) {
+  const double offset = 5;  // closest 2.7 radii
+  const double exact = sphere_displacement_in_stokes_flow(offset);
+  const auto peak = [&](double dx, double wider) {
+    return test::collide({{rigid_sphere()}, 50, offset, dx, wider}).peak;
+  };
+  const double narrow = peak(0.5, 1), wide = peak(0.5, 2), alone = (wide + (wide - narrow) / 7) / narrow;
+  std::printf(
+      "largest displacement, um: exact %.4f; boxes of 14 x 18 x 36 um and twice that %.4f %.4f, alone: times "
+      "%.4f\n",
+      exact, narrow, wide, alone);
+  std::vector<double> error;
+  for (const double dx : {0.5, 1.0 / 3, 0.25}) {
+    error.push_back(alone * (dx == 0.5 ? narrow : peak(dx, 1)) / exact - 1);
+    std::printf("dx %.3f um: %.4f (%+.1f %%)\n", dx, (1 + error.back()) * exact, 100 * error.back());
+    std::fflush(stdout);
+  }
+  EXPECT_NEAR(error[0], 0, 0.15);
+  EXPECT_NEAR(error[2], 0, 0.06);
 }
 
 }  // namespace
