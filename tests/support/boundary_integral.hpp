@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -191,6 +192,7 @@ class MembraneInStokesFlow {
           (1 - mu - nu) * x_ + mu * y + nu * older + slope * dt * (rate(y) - (1 - b(j - 1) * T[j - 1]) * f0);
       older = std::exchange(y, std::move(next));
     }
+    if (!y.allFinite()) throw std::runtime_error("the membrane in Stokes flow blew up: take shorter steps");
     before_ = std::exchange(x_, std::move(y));
   }
 
