@@ -26,8 +26,7 @@ class BoundaryIntegral {
   explicit BoundaryIntegral(const mesh::TriangleMesh& surface, double viscosity)
       : triangles_(surface.triangles), viscosity_(viscosity) {}
 
-  /// The matrix that turns forces on the vertices at \p x into their velocities, both as columns(): 3 n x 3
-  /// n.
+  /// The matrix that turns forces on the vertices at \p x into their velocities, both as columns().
   Eigen::MatrixXd mobility(const std::vector<mesh::Vec3>& x) const {
     const auto n = static_cast<Eigen::Index>(x.size());
     std::vector<double> area(n, 0);
@@ -153,7 +152,7 @@ class BoundaryIntegral {
 
 /// A membrane in unbounded flow without inertia: dx/dt = u_inf(x) + mobility x forces. Each step takes the
 /// mobility of the shape half a step ahead (by what it did in the last one) and as many stages of a
-/// Runge-Kutta- Chebyshev formula of second order (Sommeijer, Shampine, Verwer 1998) as the stiffest of the
+/// Runge-Kutta-Chebyshev formula of second order (Sommeijer, Shampine, Verwer 1998) as the stiffest of the
 /// membrane's modes asks for, which decay without oscillation: stages stabilise a step as their square.
 class MembraneInStokesFlow {
  public:
