@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -153,7 +154,8 @@ class BoundaryIntegral {
 /// A membrane in unbounded flow without inertia: dx/dt = u_inf(x) + mobility x forces. Each step takes the
 /// mobility of the shape half a step ahead (by what it did in the last one) and as many stages of a
 /// Runge-Kutta-Chebyshev formula of second order (Sommeijer, Shampine, Verwer 1998) as the stiffest of the
-/// membrane's modes asks for, which decay without oscillation: stages stabilise a step as their square.
+/// membrane's modes asks for, which decay without oscillation: stages stabilise a step as their square. Their
+/// estimate of the error of a step keeps advance() from taking one that is too long.
 class MembraneInStokesFlow {
  public:
   using Flow = std::function<mesh::Vec3(const mesh::Vec3&)>;
@@ -169,8 +171,30 @@ class MembraneInStokesFlow {
 
   std::vector<mesh::Vec3> vertices() const { return BoundaryIntegral::vectors(x_); }
 
-  void step(double dt) {
-    mobility_ = fluid_.mobility(BoundaryIntegral::vectors(1.5 * x_ - 0.5 * before_));
+  /// In equal steps, or halves, quarters... where one would add more than \p tolerance of the membrane's size
+  /// (root mean square over the vertices) to the error.
+  void advance(double time, double tolerance = 1e-4) {
+    for (double left = time; left > 1e-9 * time;) {
+      const double dt = std::min(longest_, left);
+      auto [next, error] = after(dt);
+      if (error < tolerance * x_.norm()) {
+        left -= dt;
+        longest_ = error < tolerance * x_.norm() / 10 ? 2 * dt : dt;
+        take(dt, std::move(next));
+      } else if (dt > 1e-4 * time) {  // also where it blew up and no number compares
+        longest_ = dt / 2;
+      } else {
+        throw std::runtime_error("the membrane in Stokes flow blew up");
+      }
+    }
+  }
+  /// One step, however large its error.
+  void step(double dt) { take(dt, after(dt).first); }
+
+ private:
+  /// Where the vertices are after one step, and the norm of what that step adds to their error.
+  std::pair<Eigen::VectorXd, double> after(double dt) {
+    mobility_ = fluid_.mobility(BoundaryIntegral::vectors(x_ + 0.5 * dt / last_ * (x_ - before_)));
     const Eigen::VectorXd f0 = rate(x_);
     const int stages = std::max(2, static_cast<int>(std::ceil(std::sqrt(1 + 1.7 * dt * decay_rate(f0)))));
     // Chebyshev polynomials T, their first and second derivatives at w0.
@@ -191,11 +215,13 @@ class MembraneInStokesFlow {
           (1 - mu - nu) * x_ + mu * y + nu * older + slope * dt * (rate(y) - (1 - b(j - 1) * T[j - 1]) * f0);
       older = std::exchange(y, std::move(next));
     }
-    if (!y.allFinite()) throw std::runtime_error("the membrane in Stokes flow blew up: take shorter steps");
-    before_ = std::exchange(x_, std::move(y));
+    const double error = (0.8 * (x_ - y) + 0.4 * dt * (f0 + rate(y))).norm();
+    return {std::move(y), error};
   }
-
- private:
+  void take(double dt, Eigen::VectorXd next) {
+    before_ = std::exchange(x_, std::move(next));
+    last_ = dt;
+  }
   Eigen::VectorXd rate(const Eigen::VectorXd& at) const {
     const auto x = BoundaryIntegral::vectors(at);
     Eigen::VectorXd v = mobility_ * BoundaryIntegral::columns(npfem::forces(type_, x));
@@ -221,7 +247,9 @@ class MembraneInStokesFlow {
   BoundaryIntegral fluid_;
   Flow far_;
   Eigen::VectorXd x_, before_;  ///< vertices now and a step ago
-  Eigen::VectorXd stiffest_;    ///< the mode that decays fastest
+  double last_ = 1;             ///< how long that step was
+  double longest_ = std::numeric_limits<double>::infinity();
+  Eigen::VectorXd stiffest_;  ///< the mode that decays fastest
   Eigen::MatrixXd mobility_;
 };
 

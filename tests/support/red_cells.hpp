@@ -148,6 +148,13 @@ constexpr data::Vec3 collision_box{14, 18, 36};  ///< um; images along the flow 
 struct Collision {
   double net = 0;   ///< um across the flow that each was moved by for good
   double peak = 0;  ///< um, the most in between
+  std::vector<double> along,
+      across;  ///< um: distance along the flow, by how much each has been moved by then
+
+  void add(double distance, double moved) {
+    along.push_back(distance), across.push_back(moved);
+    net = moved, peak = std::max(peak, moved);
+  }
 };
 
 /// The run ends when they are as far apart on the other side as at the start; NaN if that takes a strain
@@ -173,11 +180,11 @@ inline Collision collide(const CollisionCase& c) {
     sim.step();
     if (i % 50) continue;
     const auto a = observe(sim, 0, 0).centre, b = second().centre;
-    out.net = c.dx / 2 * (a[1] - b[1] - start);  // half of it each
-    out.peak = std::max(out.peak, out.net);
+    out.add(c.dx * (a[2] - b[2]), c.dx / 2 * (a[1] - b[1] - start));  // half of it each
     if (a[2] - b[2] > 2 * away) return out;
   }
-  return {std::nan(""), std::nan("")};
+  out.net = out.peak = std::nan("");
+  return out;
 }
 
 /// How far, um, the upper of two red cells (kappa 0.5, dx 0.5 um) that collide as above moves across the flow

@@ -19,7 +19,7 @@ inline Shear red_cell_in_stokes_flow(const ShearCase& c, int subdivision = 8) {
   MembraneInStokesFlow cell(type, rest, plasma_viscosity, shear, start);
   ShearRecord record(mesh::observe(rest, start, type.marker()), c.from, c.until);
   for (int i = 1; !record.done(); ++i) {
-    cell.step(between_looks / c.shear_rate);
+    cell.advance(between_looks / c.shear_rate);
     record.add(i * between_looks, mesh::observe(rest, cell.vertices(), type.marker()));
   }
   return record.result();
@@ -40,7 +40,7 @@ inline double return_time_in_stokes_flow(double strain = 0.1, int subdivision = 
       type, at_rest, plasma_viscosity, [](const mesh::Vec3&) { return mesh::Vec3{}; }, x);
   double early = 0;
   for (int i = 1; i * dt < 0.1; ++i) {
-    cell.step(dt);
+    cell.advance(dt);
     const double left = share_left(cell.vertices(), rest, imposed);
     if (early == 0 && left < 0.8) early = i * dt;
     if (left < 0.4) return (i * dt - early) / std::log(2.0);

@@ -53,11 +53,12 @@ TEST(Leakage, FallsWithThetaAndGrowsWithTau) {
     std::fflush(stdout);
     return l;
   };
-  double before = 1;
+  double before = 1, leaked = 1;
   for (const double theta : {0.0, 0.5, 0.9, 0.97}) {
     const Leak l = show(theta, 2);
     EXPECT_LT(l.slip, before);
-    before = l.slip;
+    EXPECT_LT(std::abs(l.volume), leaked);
+    before = l.slip, leaked = std::abs(l.volume);
   }
   // A marker's slip is (1 - theta) of its kick J/a, a force per area times dt: over gamma a it goes with tau
   // - 1/2.

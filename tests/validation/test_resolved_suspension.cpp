@@ -11,6 +11,7 @@
 #include "resolved/simulation.hpp"
 #include "support/blood_scene.hpp"
 #include "support/figure.hpp"
+#include "support/red_cells.hpp"
 
 namespace hemowalk::resolved {
 namespace {
@@ -160,6 +161,72 @@ TEST(Suspension, StressOverTheChoicesOfTheStep) {
   EXPECT_FALSE(preflight(scene).empty()) << "a retracted surface does not stand it";
 }
 
+/// Blood between walls, looked at once in a millisecond: means over the looks.
+struct Watched {
+  std::vector<double> velocity;             ///< along the flow over U, plane by plane
+  double vorticity = 0;                     ///< mean velocity along vorticity over U
+  double lower = 0, upper = 0;              ///< shear stress upon the walls over that of plasma
+  double residual = 0;                      ///< momentum that the budget misses, over all its parts: largest
+  std::vector<std::vector<double>> height;  ///< um, of the red cells' centres, look by look
+
+  /// In the middle 40 % of the gap, over the nominal one.
+  double core_shear() const {
+    const int n = static_cast<int>(velocity.size());
+    std::vector<double> y, u;
+    for (int j = n * 3 / 10; j < n * 7 / 10; ++j) y.push_back((j + 0.5) / n), u.push_back(velocity[j]);
+    return fit_line(y, u).slope;
+  }
+  /// Square displacement across the flow, um2, of each cell over \p lag looks that begin \p off um or more
+  /// off the walls of a gap of \p gap um.
+  std::vector<double> strayed(std::size_t lag, double gap, double off = 0) const {
+    std::vector<double> of_cell;
+    for (std::size_t c = 0; c < height.front().size(); ++c) {
+      double sum = 0, pairs = 0;
+      for (std::size_t i = 0; i + lag < height.size(); ++i)
+        if (std::min(height[i][c], gap - height[i][c]) >= off)
+          sum += std::pow(height[i + lag][c] - height[i][c], 2), pairs += 1;
+      if (pairs > 0) of_cell.push_back(sum / pairs);
+    }
+    return of_cell;
+  }
+};
+
+/// \p from, \p end: s. Packs the scene's own seed.
+Watched watch(const data::Scene& scene, double from, double end) {
+  Simulation<float> sim(scene, pack(scene));
+  const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
+  const int n = sim.block().ny;
+  const double rate = sim.units().rate(scene.flow.shear_rate), um = 1e6 * scene.fluid.dx,
+               unit = 0.5 * rate * sim.block().nx * sim.block().nz;
+  const auto every = static_cast<std::int64_t>(sim.units().steps(1e-3));
+  Watched out;
+  out.velocity.resize(n);
+  const auto whole = sim.momentum().total();
+  Momentum first{}, last{};
+  double steps = 0;
+  while (sim.time() < end) {
+    for (std::int64_t i = 0; i < every; ++i) sim.step();
+    if (sim.time() < from) continue;
+    last = sim.momentum();
+    out.height.empty() ? void(first = last) : void(steps += static_cast<double>(every));
+    for (int d = 0; d < 3; ++d)
+      out.residual = std::max(out.residual, std::abs(last.total()[d] - whole[d]) / last.scale());
+    const auto planes = sim.fluid().profiles(sim.force());
+    for (int j = 0; j < n; ++j) {
+      out.velocity[j] += planes.velocity[j][2] / (rate * n);
+      out.vorticity += planes.velocity[j][0] / (rate * n) / n;
+    }
+    out.height.emplace_back();
+    for (int c = 0; c < cells.count(); ++c) out.height.back().push_back(um * cells.observe(c).centre[1]);
+  }
+  const auto looks = static_cast<double>(out.height.size());
+  for (double& u : out.velocity) u /= looks;
+  out.vorticity /= looks;
+  out.lower = (last.to_lower_wall[2] - first.to_lower_wall[2]) / steps / unit;
+  out.upper = (first.to_upper_wall[2] - last.to_upper_wall[2]) / steps / unit;
+  return out;
+}
+
 // Nothing tells top from bottom: over packings the asymmetries of single ones average out, while in each the
 // stress is the same at both walls. Four means are looked at: at a level of 1 % for all of them (0.25 % each,
 // two-sided) Student's t with 7 degrees of freedom allows 4.6 standard errors. A true asymmetry of 5.8 is
@@ -176,46 +243,26 @@ TEST(Suspension, TopAndBottomOverPackings) {
                          "relative viscosity"};
   std::vector<std::vector<double>> found(std::size(names));
   for (int seed = 1; seed <= packings; ++seed) {
-    const data::Scene scene = quickstart(seed);
-    Simulation<float> sim(scene, pack(scene));
-    const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
-    const int n = sim.block().ny;
-    const double rate = sim.units().rate(scene.flow.shear_rate),
-                 unit = 0.5 * rate * sim.block().nx * sim.block().nz;
-    const auto every = static_cast<std::int64_t>(sim.units().steps(1e-3));
-    std::vector<double> u(n);
-    double moment = 0, vorticity = 0, samples = 0;
-    Momentum start{};
-    std::int64_t steps = 0;
-    while (sim.time() < end) {
-      for (std::int64_t i = 0; i < every; ++i) sim.step();
-      if (samples > 0) steps += every;
-      if (sim.time() < from) continue;
-      if (samples == 0) start = sim.momentum();
-      const auto planes = sim.fluid().profiles(sim.force());
-      for (int j = 0; j < n; ++j)
-        u[j] += planes.velocity[j][2] / (rate * n), vorticity += planes.velocity[j][0] / (rate * n) / n;
-      for (int c = 0; c < cells.count(); ++c)
-        moment += (2 * cells.observe(c).centre[1] / n - 1) / cells.count();
-      ++samples;
-    }
-    for (double& value : u) value /= samples;
-    const Momentum last = sim.momentum();
-    const double lower = (last.to_lower_wall[2] - start.to_lower_wall[2]) / static_cast<double>(steps) / unit,
-                 upper = (start.to_upper_wall[2] - last.to_upper_wall[2]) / static_cast<double>(steps) / unit;
-    std::vector<double> y, core;
-    for (int j = n * 3 / 10; j < n * 7 / 10; ++j) y.push_back((j + 0.5) / n), core.push_back(u[j]);
-    const double values[] = {
-        moment / samples,    (u[n / 2 - 1] + u[n / 2]) / 2, std::log((0.5 - u[n - 4]) / (u[3] + 0.5)),
-        vorticity / samples, fit_line(y, core).slope,       (lower + upper) / 2};
+    const Watched seen = watch(quickstart(seed), from, end);
+    const auto& u = seen.velocity;
+    const std::size_t n = u.size();
+    double moment = 0, samples = 0;
+    for (const auto& look : seen.height)
+      for (const double y : look) moment += 2 * y / 20 - 1, ++samples;
+    const double values[] = {moment / samples,
+                             (u[n / 2 - 1] + u[n / 2]) / 2,
+                             std::log((0.5 - u[n - 4]) / (u[3] + 0.5)),
+                             seen.vorticity,
+                             seen.core_shear(),
+                             (seen.lower + seen.upper) / 2};
     std::printf("packing %d:", seed);
     for (std::size_t k = 0; k < found.size(); ++k) {
       found[k].push_back(values[k]);
       std::printf(" %.4f", values[k]);
     }
-    std::printf("; stress at the walls %.3f, %.3f\n", lower, upper);
+    std::printf("; stress at the walls %.3f, %.3f\n", seen.lower, seen.upper);
     std::fflush(stdout);
-    EXPECT_NEAR(upper / lower, 1, 0.01);
+    EXPECT_NEAR(seen.upper / seen.lower, 1, 0.01);
     EXPECT_LT(std::abs(values[3]), 0.02);
   }
   std::printf("| what | mean over packings ± standard error | scatter between packings |\n");
@@ -236,7 +283,8 @@ TEST(Suspension, OverCubes) {
     double box;
     int packings;
   } cubes[] = {{20, 3}, {25, 3}, {35, 2}, {50, 1}};
-  const double from = 30e-3, end = 60e-3, lag = 20e-3, look = 1e-3, off_walls = 4;  // um
+  const double off_walls = 4;      // um
+  constexpr std::size_t lag = 20;  // ms
   std::printf(
       "| box, µm (packings) | stress/μγ | core shear / γ | square displacement of red cells across the flow "
       "over 20 ms, µm² | of those that start 4 µm or more off the walls |\n");
@@ -247,43 +295,11 @@ TEST(Suspension, OverCubes) {
     for (int seed = 1; seed <= cube.packings; ++seed) {
       data::Scene scene = blood(cube.box, 50, 0.5);
       scene.flow.walls = data::Flow::Walls::both, scene.seed = seed;
-      Simulation<float> sim(scene, pack(scene));
-      const auto& cells = std::get<npfem::Membranes<float>>(sim.groups()[0].cells);
-      const int n = sim.block().ny;
-      const double rate = sim.units().rate(100), um = 1e6 * scene.fluid.dx;
-      const auto every = static_cast<std::int64_t>(sim.units().steps(look));
-      std::vector<std::vector<double>> y;
-      std::vector<double> u(n);
-      double impulse = 0, steps = 0;
-      while (sim.time() < end) {
-        const double before = sim.momentum().to_lower_wall[2];
-        for (std::int64_t i = 0; i < every; ++i) sim.step();
-        if (sim.time() < from) continue;
-        impulse += sim.momentum().to_lower_wall[2] - before, steps += static_cast<double>(every);
-        const auto planes = sim.fluid().profiles(sim.force());
-        for (int j = 0; j < n; ++j) u[j] += planes.velocity[j][2] / (rate * n);
-        y.emplace_back();
-        for (int c = 0; c < cells.count(); ++c) y.back().push_back(um * cells.observe(c).centre[1]);
-      }
-      const auto apart = static_cast<std::size_t>(std::lround(lag / look));
-      const auto strayed = [&](double off) {
-        std::vector<double> of_cell;
-        for (int c = 0; c < cells.count(); ++c) {
-          double sum = 0, pairs = 0;
-          for (std::size_t i = 0; i + apart < y.size(); ++i)
-            if (std::min(y[i][c], cube.box - y[i][c]) >= off)
-              sum += std::pow(y[i + apart][c] - y[i][c], 2), pairs += 1;
-          if (pairs > 0) of_cell.push_back(sum / pairs);
-        }
-        return of_cell;
-      };
-      square.push_back(mean(strayed(0))), within.push_back(standard_error(strayed(0)));
-      middle.push_back(mean(strayed(off_walls)));
-      stress.push_back(impulse / steps / (0.5 * rate) / (sim.block().nx * sim.block().nz));
-      std::vector<double> h, core;
-      for (int j = n * 3 / 10; j < n * 7 / 10; ++j)
-        h.push_back((j + 0.5) / n), core.push_back(u[j] / static_cast<double>(y.size()));
-      shear.push_back(fit_line(h, core).slope);
+      const Watched seen = watch(scene, 30e-3, 60e-3);
+      const auto of_cell = seen.strayed(lag, cube.box);
+      square.push_back(mean(of_cell)), within.push_back(standard_error(of_cell));
+      middle.push_back(mean(seen.strayed(lag, cube.box, off_walls)));
+      stress.push_back((seen.lower + seen.upper) / 2), shear.push_back(seen.core_shear());
     }
     const double error = cube.packings > 1 ? standard_error(square) : within[0];
     std::printf("| %.0f (%d) | %.3f | %.3f | %.3f ± %.3f (± over %s) | %.3f |\n", cube.box, cube.packings,
@@ -300,7 +316,53 @@ TEST(Suspension, OverCubes) {
       .curve("red cells", Style::points, 0, width, stray, stray_error)
       .write();
   EXPECT_GT(stray.back(), stray.front()) << "the narrow box confines";
-  for (const double v : viscosity) EXPECT_NEAR(v / viscosity.back(), 1, 0.25);
+  // Packings of 30 cells scatter by 0.05 of 2.7 (TopAndBottomOverPackings), the flow is still starting.
+  for (const double v : viscosity) EXPECT_NEAR(v / viscosity.back(), 1, 0.08);
+}
+
+// The published couplings beside ours, each as it is meant to run: the momentum that they lose, the plug that
+// they make of blood, the drift along vorticity, how far cells stray. 10 to 30 ms of one packing; peskin
+// blows up at 41.
+TEST(Suspension, UnderTheThreeCouplings) {
+  auto ours = quickstart(), paper = quickstart(), peskin = quickstart();
+  test::use_paper_coupling(paper);
+  peskin.coupling.scheme = data::Coupling::Scheme::peskin, peskin.coupling.retraction = 0,
+  peskin.coupling.kernel = data::Coupling::Kernel::phi4, peskin.acceleration = 4;
+  for (auto& kind : peskin.cells.kinds) kind.kappa_damping = 0;
+  peskin.cells.kinds[1].law = data::Kind::Law::paper, peskin.cells.kinds[1].bending.modulus = 100e-18;
+  std::printf(
+      "| coupling | momentum residual, largest | core shear/γ | shear over 1.75 µm at the walls/γ | mean "
+      "velocity along vorticity/U | stress/μγ, lower, upper wall | square displacement of red cells over 10 "
+      "ms, µm² |\n");
+  using Style = test::Figure::Style;
+  test::Figure figure("couplings_20um_velocity", "Blood at 35 % in 20 µm, 10 to 30 ms", "height over gap",
+                      "velocity over that of the walls against each other");
+  std::vector<Watched> seen;
+  std::vector<double> height;
+  for (const auto& [name, scene] :
+       {std::pair{"conservative", &ours}, {"paper", &paper}, {"peskin", &peskin}}) {
+    seen.push_back(watch(*scene, 10e-3, 30e-3));
+    const Watched& w = seen.back();
+    const auto& u = w.velocity;
+    const auto n = static_cast<int>(u.size());
+    const auto stray = w.strayed(10, 20);
+    std::printf("| %s | %.1e | %.3f | %.2f, %.2f | %.4f | %.2f, %.2f | %.3f ± %.3f |\n", name, w.residual,
+                w.core_shear(), (u[3] + 0.5) * n / 3.5, (0.5 - u[n - 4]) * n / 3.5, w.vorticity, w.lower,
+                w.upper, mean(stray), standard_error(stray));
+    std::fflush(stdout);
+    height.clear();
+    for (int j = 0; j < n; ++j) height.push_back((j + 0.5) / n);
+    figure.curve(name, Style::line, static_cast<int>(seen.size()) - 1, height, u);
+  }
+  std::vector<double> plasma;
+  for (const double y : height) plasma.push_back(y - 0.5);
+  figure.curve("plasma alone", Style::dashes, -1, height, plasma).write();
+  for (const int i : {0, 2}) EXPECT_LT(seen[i].residual, 1e-6);
+  EXPECT_GT(seen[1].residual, 0.01);
+  EXPECT_GT(seen[0].core_shear(), 0.7);
+  for (const int i : {1, 2}) EXPECT_LT(seen[i].core_shear(), 0.6) << "no plug";
+  EXPECT_LT(std::abs(seen[0].vorticity), 0.02);
+  EXPECT_NEAR(seen[0].upper / seen[0].lower, 1, 0.01);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // Each component can be replaced behind the face the others see: a membrane of springs in place of npfem, a
-// prescribed flow in place of the lattice Boltzmann fluid. Neither knows anything of the rest of the solver.
+// prescribed flow in place of the lattice Boltzmann fluid. Each sees the fields that fluid and cells meet in
+// and nothing else of the solver; the springs take their rest shape from the cell's type.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -103,8 +104,8 @@ TEST(Replaceable, AMembraneOfSpringsInTheFluid) {
   EXPECT_GT(deformation[0], 2 * deformation[1]);
 }
 
-// A soft membrane in a prescribed shear flow is carried along with the flow: every vertex by rate y t. phi4
-// reads a linear flow exactly, what is left are the springs' pull and the retraction (delta n turns).
+// A soft membrane in a prescribed shear flow is carried along with the flow: every vertex by rate y t. The
+// kernel reads a linear flow exactly, what is left are the springs' pull and the retraction (delta n turns).
 TEST(Replaceable, APrescribedFlowCarriesTheMembrane) {
   for (const bool springs : {false, true}) {
     auto scene = soft_scene();
