@@ -104,8 +104,9 @@ TEST(Replaceable, AMembraneOfSpringsInTheFluid) {
   EXPECT_GT(deformation[0], 2 * deformation[1]);
 }
 
-// A soft membrane in a prescribed shear flow is carried along with the flow: every vertex by rate y t. The
-// kernel reads a linear flow exactly, what is left are the springs' pull and the retraction (delta n turns).
+// A soft membrane in a prescribed shear flow is carried along with the flow, every vertex by rate y t: the
+// kernel reads a linear flow exactly. What is left is the membrane's pull (1e-12 N/m: 1.4e-9 dx are seen);
+// the springs have none.
 TEST(Replaceable, APrescribedFlowCarriesTheMembrane) {
   for (const bool springs : {false, true}) {
     auto scene = soft_scene();
@@ -123,7 +124,8 @@ TEST(Replaceable, APrescribedFlowCarriesTheMembrane) {
     for (int i = 0; i < steps; ++i) sim.step();
     const auto end = cells.positions(0);
     for (std::size_t k = 0; k < start.size(); ++k)
-      EXPECT_NEAR(end[k][2] - start[k][2], rate * (start[k][1] - 12) * steps, 1e-3) << "vertex " << k;
+      EXPECT_NEAR(end[k][2] - start[k][2], rate * (start[k][1] - 12) * steps, springs ? 1e-12 : 1e-8)
+          << "vertex " << k;
   }
 }
 

@@ -65,7 +65,7 @@ const Case cases[] = {
     {"ObjRigidByAGradient", "mesh, file: cell.obj", "rigid", slab, gradient, "[]", {0, 0, 1}, false},
     {"StlSkalakInShearPulled",
      "mesh, file: cell.stl",
-     "skalak, Gs: 5 pN/um, C: 1, bending: {model: helfrich}",
+     "skalak, Gs: 5 pN/um, C: 1, bending: {model: helfrich, reference_curvature: 0.2 1/um}",
      slab,
      couette,
      pulled,
