@@ -205,7 +205,8 @@ Watched watch(const data::Scene& scene, double from, double end) {
   Momentum first{}, last{};
   double steps = 0;
   while (sim.time() < end) {
-    for (std::int64_t i = 0; i < every; ++i) sim.step();
+    const auto until = sim.fluid_steps() + every;  // a step of paper's solid takes two of the fluid
+    while (sim.fluid_steps() < until) sim.step();
     if (sim.time() < from) continue;
     last = sim.momentum();
     out.height.empty() ? void(first = last) : void(steps += static_cast<double>(every));
