@@ -209,7 +209,10 @@ Watched watch(const data::Scene& scene, double from, double end) {
     while (sim.fluid_steps() < until) sim.step();
     if (sim.time() < from) continue;
     last = sim.momentum();
-    out.height.empty() ? void(first = last) : void(steps += static_cast<double>(every));
+    if (out.height.empty())
+      first = last;
+    else
+      steps += static_cast<double>(every);
     for (int d = 0; d < 3; ++d)
       out.residual = std::max(out.residual, std::abs(last.total()[d] - whole[d]) / last.scale());
     const auto planes = sim.fluid().profiles(sim.force());
