@@ -1,6 +1,7 @@
 // "Particle in kernel" by hand: bodies of one or two vertices.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 #include "core/check.hpp"
@@ -11,7 +12,7 @@ namespace {
 
 struct Vertex {
   std::uint16_t body;
-  Node4<double> x, normal;
+  std::array<double, 3> x, normal;
 };
 
 struct Outcome {
@@ -30,7 +31,8 @@ Outcome press(const KernelLaw& law, const Domain& domain, const std::vector<Vert
       count.push_back(0);
     }
     ++count[v.body];
-    x.push_back({v.x.x - 3, v.x.y, v.x.z + 7, 0}), n.push_back(v.normal);
+    x.push_back({v.x[0] - 3, v.x[1], v.x[2] + 7, 0});
+    n.push_back({v.normal[0], v.normal[1], v.normal[2], 0});
   }
   const std::vector<Origin> origin(bodies.size(), Origin{3, 0, -7});
   KernelContact<double> contact(law, domain, count);
