@@ -433,7 +433,7 @@ test::Collision spheres_in_stokes_flow(double offset) {
 }
 
 // Spheres push each other aside as far as they should. Images and walls hold them back by the cube of the
-// box where it is wide: taken off by the two widest (twice and 2.5 times the usual one: 0.2556 um; 1 and 2
+// box where it is wide: taken off by the two widest (twice and 2.5 times the usual one: 0.2555 um; 1 and 2
 // times give 0.2489, 1.5, 2 and 2.5 times with a fifth power beside the cube 0.2565).
 TEST(PairCollision, OfSpheresAsInStokesFlow) {
   const double offset = 5;  // closest 2.7 radii
