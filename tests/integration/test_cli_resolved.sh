@@ -9,8 +9,8 @@ cd "$work" || exit 1
 failures=0
 fail() { echo "FAIL $*"; failures=$((failures + 1)); }
 progress() { sed -n 's/.*"progress": \([0-9.]*\).*/\1/p' "$1"/runs/*/status.json 2>/dev/null | head -n 1; }
-# Waits until the run of campaign folder $1 is under way.
-under_way() { for _ in $(seq 1200); do case "$(progress "$1")" in 0.[1-9]*) return 0 ;; esac; sleep 0.05; done; fail "$1 never got under way"; }
+# Waits until the run of campaign folder $1 is under way, for as long as its driver lives: a busy machine is slow.
+under_way() { while kill -0 "$driver" 2>/dev/null; do case "$(progress "$1")" in 0.[1-9]*) return 0 ;; esac; sleep 0.05; done; fail "$1 never got under way"; }
 # The child of process $1 that runs the solver.
 child_of() { cat "/proc/$1/task/$1/children" 2>/dev/null; }
 # Everything calibrate sees in the only run of $1: equal text, equal trajectories to the bit.
