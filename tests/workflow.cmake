@@ -20,5 +20,5 @@ if(TARGET hemowalk)
   set_tests_properties(test_cli_ranks PROPERTIES LABELS integration TIMEOUT 600)
   # Kills and resumes real runs: minutes on a busy machine.
   add_test(NAME test_cli_resolved COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/integration/test_cli_resolved.sh $<TARGET_FILE:hemowalk>)
-  set_tests_properties(test_cli_resolved PROPERTIES LABELS validation TIMEOUT 900)
+  set_tests_properties(test_cli_resolved PROPERTIES LABELS validation TIMEOUT 3600)
 endif()

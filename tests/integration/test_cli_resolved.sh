@@ -26,6 +26,7 @@ scene:
   time: {end: 24 ms, sample: 0.1 ms, profile: 2 ms}
 calibrate: {t0: 1 ms, lag: 1 ms, bootstrap: 20}
 on_failure: {action: retry, attempts: 2}
+launcher: {threads: 1}  # beside other tests: threads that wait for one another must not wait for a core
 YAML
 
 "$program" run scene.yaml --out whole >out.txt 2>&1 || { fail "the whole campaign: exit $?"; cat out.txt; }
