@@ -113,6 +113,15 @@ TEST(HydrodynamicThickness, OverTheKernel) {
   }
 }
 
+/// Limit of small dx by order 2 from its values at 1/3 and 0.25 um.
+double limit_of(double coarse, double fine) { return fine - (coarse - fine) / (std::pow(4.0 / 3, 2) - 1); }
+
+/// Thickness t, um, with which the spheroid of half axes 1.8 + t and 0.55 + t has the period (times gamma).
+double effective_thickness(double period) {
+  const double sum = period / (2 * M_PI), aspect = sum / 2 + std::sqrt(sum * sum / 4 - 1);
+  return (platelet_radii[0] - aspect * platelet_radii[1]) / (aspect - 1);
+}
+
 TEST(HydrodynamicThickness, OverLatticeSpacing) {
   std::printf("dx/um  n | platelet: period gamma, drag broadside, edgewise (retraction %.2f)\n",
               data::Coupling{}.retraction);
@@ -126,13 +135,17 @@ TEST(HydrodynamicThickness, OverLatticeSpacing) {
     BodyCase c;
     c.dx = level.dx, c.subdivision = level.n;
     const Platelet p = platelet(c, level.places);
-    std::printf("%.3f  %d | %.2f %.3f %.3f\n", level.dx, level.n, p.period, p.broadside, p.edgewise);
+    std::printf("%.3f  %d | %.2f %.3f %.3f, effective thickness %.4f um\n", level.dx, level.n, p.period,
+                p.broadside, p.edgewise, effective_thickness(p.period));
     spacing.push_back(level.dx), period.push_back(p.period / exact_period);
     broadside.push_back(p.broadside), edgewise.push_back(p.edgewise);
     EXPECT_NEAR(p.period / exact_period, 1, 0.05) << level.dx;
     EXPECT_NEAR(p.broadside, 1, 0.05) << level.dx;
     EXPECT_NEAR(p.edgewise, 1, 0.05) << level.dx;
   }
+  EXPECT_NEAR(limit_of(period[4], period[6]), 1, 0.03) << "limit by order 2 from 1/3 and 0.25 um";
+  std::printf("limit by order 2 from 1/3 and 0.25 um: %+.1f %%\n",
+              100 * (limit_of(period[4], period[6]) - 1));
   using Style = test::Figure::Style;
   test::Figure("platelet_over_dx", "Rigid platelet", "lattice spacing, µm", "over the exact spheroid's")
       .with("set yrange [0.9:1.1]")
@@ -180,6 +193,7 @@ TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
                {"Skalak 100 pN/um, C 50", skalak, 0.5, 4},
                {"paper, bending 100 pN um", paper, 1.0 / 3, 6},
                {"paper, bending 100 pN um", paper, 0.25, 8}};
+  std::vector<double> periods;
   std::printf("law  dx/um | period gamma, aspect ratio it belongs to; drag broadside, edgewise\n");
   for (const auto& x : cases) {
     BodyCase c;
@@ -195,7 +209,11 @@ TEST(HydrodynamicThickness, WholeOrbitsRigidAndDeformable) {
     EXPECT_NEAR(period / exact_period, 1, 0.05) << x.name << x.dx;
     EXPECT_NEAR(broadside, 1, 0.05) << x.name << x.dx;
     EXPECT_NEAR(edgewise, 1, 0.05) << x.name << x.dx;
+    periods.push_back(period / exact_period);
   }
+  const double limit = limit_of(periods[3], periods[4]);
+  std::printf("deformable, limit by order 2 from 1/3 and 0.25 um: %+.1f %%\n", 100 * (limit - 1));
+  EXPECT_NEAR(limit, 1, 0.03);
 }
 
 // Without retraction a deformable platelet is too thick on every lattice, by a thickness t on all sides that
@@ -211,9 +229,8 @@ TEST(HydrodynamicThickness, DeformablePlateletWithoutRetraction) {
     c.shape = test::platelet_shape(), c.material = paper, c.dx = dx, c.subdivision = n;
     c.coupling.retraction = 0;
     c.acceleration = dx < 0.3 ? 100 : 50;
-    const double period = orbit(c), sum = period / (2 * M_PI),
-                 aspect = sum / 2 + std::sqrt(sum * sum / 4 - 1);
-    thickness.push_back((platelet_radii[0] - aspect * platelet_radii[1]) / (aspect - 1));
+    const double period = orbit(c);
+    thickness.push_back(effective_thickness(period));
     std::printf("%.3f | %.2f %.4f\n", dx, period, thickness.back());
     std::fflush(stdout);
   }

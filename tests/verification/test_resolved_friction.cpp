@@ -2,6 +2,8 @@
 // (method 5.2).
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "core/data/scene.hpp"
 #include "support/sheets.hpp"
 
@@ -36,6 +38,18 @@ TEST(SheetFriction, IsRightWithTheRetractionOfEachKernel) {
       EXPECT_NEAR(mean_over_offsets(c), 1, gap < 1 ? k.close : k.apart)
           << "kernel " << static_cast<int>(k.kernel) << ", gap " << gap << " dx";
     }
+  }
+}
+
+// Two membranes 0.5 um apart, as in crowded blood, on the lattices of dx 0.5, 1/3 and 0.25 um.
+TEST(SheetFriction, OfOneFilmOverLatticeSpacing) {
+  const auto shipped = data::Coupling::with(data::Coupling::Kernel::phi3);
+  for (const double dx : {0.5, 1.0 / 3, 0.25}) {
+    test_support::SheetCase c;
+    c.gap = 0.5 / dx, c.kernel = ibm::Kernel::phi3, c.retraction = shipped.retraction, c.chi = shipped.chi;
+    const double friction = mean_over_offsets(c);
+    std::printf("film of 0.5 um, dx %.3f um: friction %.3f\n", dx, friction);
+    EXPECT_NEAR(friction, 1, 0.04) << "dx " << dx << " um";
   }
 }
 
