@@ -226,7 +226,11 @@ Calibration calibrate(const std::vector<data::Trajectories>& runs, const Options
   c.kurtosis = kurtosis_of(ensemble, core);
 
   const auto [best, reason] = recommend(c.estimators, lags);
-  require(best.D > 0 && std::isfinite(best.sigma), [&] {
+  require(!std::isfinite(best.D) || best.D > 0, [&] {
+    return "D by " + best.name + " comes out as " + std::to_string(best.D * 1e12) +
+           "e-12 m2/s (memory or walls rule at this lag) run longer, raise t0 or give another lag";
+  });
+  require(std::isfinite(best.D) && std::isfinite(best.sigma), [&] {
     return "no D in the core layer " + std::to_string(core.low * 1e6) + " .. " +
            std::to_string(core.high * 1e6) +
            " um (fewer than two cells with displacements start there) widen the layer or add cells";

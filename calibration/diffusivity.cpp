@@ -244,12 +244,15 @@ Recommended recommend(const std::vector<Estimate>& all, const Lags& lags) {
   const Estimate &plateau = find("plateau"), &memory = find("memory"), &walls = find("local");
   char why[200];
   const double missing = 1 / lags.memory.factor(plateau.lag) - 1;
-  const Estimate& line = find("gls");
+  const Estimate &line = find("gls"), &slope = find("green_kubo");
   if (missing * plateau.D > plateau.sigma && lags.memory.at_limit && std::isfinite(line.D)) {
+    // Where the MSD still bends, the weighted line through its strongly correlated points has no meaning.
+    const bool straight = std::abs(line.D - slope.D) <= 3 * std::hypot(line.sigma, slope.sigma);
     std::snprintf(why, sizeof why,
-                  "memory of at least %.3g ms, longer than these lags can tell: line from %.3g ms on",
-                  lags.memory.memory * 1e3, line.lag * 1e3);
-    return {line, why};
+                  "memory of at least %.3g ms, longer than these lags can tell: %s %.3g ms on",
+                  lags.memory.memory * 1e3,
+                  straight ? "line from" : "the MSD still bends, its mean slope from", line.lag * 1e3);
+    return {straight || !std::isfinite(slope.D) ? line : slope, why};
   }
   if (missing * plateau.D > plateau.sigma && std::isfinite(memory.D)) {
     std::snprintf(why, sizeof why,

@@ -101,8 +101,9 @@ std::vector<Estimate> estimators(const Ensemble& ensemble, const Layer& core, co
                                  const Lags& lags, const Resampling& resampling, const LocalFit& fit);
 
 /// The estimate that goes into the law, and why: `plateau`, unless memory biases it by more than its error
-/// (`memory`; `gls` where the memory is longer than the lags can tell) or walls and D(y) by more than a tenth
-/// of it (`local`).
+/// (`memory`; where the memory is longer than the lags can tell `gls`, or `green_kubo` if the MSD is no
+/// straight line there, more than three standard errors apart) or walls and D(y) by more than a tenth of it
+/// (`local`).
 struct Recommended {
   Estimate estimate;
   std::string reason;

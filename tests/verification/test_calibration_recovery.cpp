@@ -156,6 +156,29 @@ TEST(Recovery, MemoryLongerThanTheLagsCanTell) {
   EXPECT_GT(c.law.core.D, c.find("plateau")->D);
 }
 
+// A window of 42 ms and a memory of 15 ms, as in the first strains of blood: the MSD bends at all lags, and
+// the weighted line through its almost fully correlated points falls far below every slope.
+TEST(Recovery, NoStraightLineAtTheseLags) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    Synthetic s;
+    s.platelets = 470;
+    s.duration = 0.048;
+    s.memory = 15e-3;
+    s.D = 3e-11;
+    s.seed = seed;
+    Options o;
+    o.t0 = 0.006;
+    o.lag = 0.01;
+    o.bootstrap = 200;
+    const Calibration c = calibrate({generate(s)}, o);
+    // D (1 - exp(-t/T)) from 5 to 10 ms is 0.28 to 0.49 of D: a lower bound, said to be one.
+    EXPECT_GT(c.law.core.D, 0.25 * s.D) << c.core_estimator << ", seed " << seed;
+    EXPECT_TRUE(std::any_of(c.warnings.begin(), c.warnings.end(),
+                            [](const std::string& w) { return w.find("run longer") != std::string::npos; }))
+        << "seed " << seed;
+  }
+}
+
 TEST(Recovery, JumpsAreCountedAndCanBeRemoved) {
   Synthetic s;
   s.platelets = 400;
